@@ -56,7 +56,13 @@ pub(crate) fn bounded<T>(
     work: impl FnOnce() -> Result<T, AnalysisError>,
 ) -> Result<T, AnalysisError> {
     let limit = time_limit::TimeLimit::from_operations(OPERATIONS_PER_BYTE * memory as f64);
-    time_limit::within_default(limit, || work().map_err(with_limit))
+    time_limit::within_default(limit, || {
+        work().map_err(|failure| match time_limit::ended() {
+            Some(Ended::AfterOperations(_)) => with_limit(failure),
+            // The limit is that of a caller, which names it.
+            _ => failure,
+        })
+    })
 }
 
 /// Returns the failure of an analysis. If a limit has ended a search, the failure names the limit.

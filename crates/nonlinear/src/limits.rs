@@ -1,6 +1,10 @@
 //! Limits of this crate. They decide when a search ends, and which effects are significant, are
 //! negligible or are due to rounding.
 
+/// Number of operations, for a limit of the work, of the simulation of one sample of a degree of
+/// freedom, for each pair of a degree of freedom and a direction.
+pub(crate) const SAMPLE_OPERATIONS: f64 = 40.0;
+
 /// Maximum number of Gauss–Newton steps of a search; a search that needs more did not start near a
 /// minimum.
 pub(crate) const SEARCH_STEPS: usize = 60;

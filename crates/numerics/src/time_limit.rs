@@ -182,19 +182,20 @@ pub fn join<A: Send, B: Send>(
 
 /// Runs a part of some work, such as the search for the cause of a bad fit, with a limit of its
 /// own: this `share` (pure number) of the operations of the whole work, in addition to its limit.
-/// Without a limit of operations, the part runs like the rest of the work.
+/// [`ended`] does not report the end of this limit, because it does not affect the rest of the
+/// work. Without a limit of operations, the part runs like the rest of the work.
 pub fn apart<T>(share: f64, work: impl FnOnce() -> T) -> T {
     let active = ACTIVE.with_borrow(Option::clone);
-    let Some((active, most)) = active.and_then(|active| match active.limit {
-        Limit::Operations(most) => Some((active, most)),
+    let limit = active.and_then(|active| match active.limit {
+        Limit::Operations(most) => {
+            Some(Active::new(TimeLimit::from_operations(share * most), active.is_default))
+        }
         Limit::Seconds(_) | Limit::Polls(_) => None,
-    }) else {
-        return work();
-    };
-    let limit = Active::new(TimeLimit::from_operations(share * most), active.is_default);
-    let (result, (_, has_ended)) = counted(limit, work);
-    active.has_ended.set(active.has_ended.get() || has_ended);
-    result
+    });
+    match limit {
+        Some(limit) => run(Some(limit), work),
+        None => work(),
+    }
 }
 
 /// Runs some work with a limit. Also returns the number of its operations, and whether the limit

@@ -92,7 +92,11 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     time_limit::bounded(measurement.memory(), || fitted(measurement, how))
 }
 
-fn fitted(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, AnalysisError> {
+/// Identifies the modes of a decay without a limit of its own.
+pub(crate) fn fitted(
+    measurement: &Measurement,
+    how: &DecaySettings,
+) -> Result<Decayed, AnalysisError> {
     let kind = kind_of(measurement)?;
     let whole = how.part(measurement)?.whole_block()?;
     let (_, record) = responses_of(&whole, kind)?;

@@ -132,15 +132,7 @@ fn identify_records(
     let hold = how.hold();
     let records = measurements.iter().map(|measured| measured.hold(hold));
     let mut records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
-    let first = records.first().ok_or(AnalysisError::NoRecord)?;
-    let dofs = first.held.force.channels();
-    for record in &records {
-        let got = record.held.force.channels();
-        if got != dofs {
-            let file = record.held.file.clone();
-            return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
-        }
-    }
+    let dofs = degrees_of_freedom(&records)?;
     let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
     let (mut hits, mut hit_noise, mut of_hits) = (Vec::new(), Vec::new(), Vec::new());
@@ -164,7 +156,7 @@ fn identify_records(
     })?;
     let mut summary = IdentificationSummary::new(&records, &mut fitted, unscaled, hits, how)?;
     summary.remarks.extend(of_hits);
-    let causes = [Subject::Delay, Subject::Linearity];
+    let causes = [Subject::Delay, Subject::Linearity, Subject::Alternative];
     let is_named = |check: &CheckRow| check.is_conspicuous() && causes.contains(&check.subject);
     let is_unexplained = summary.fit.unexplained_motion > Some(CONSPICUOUS);
     // The search for modes takes seconds and is omitted if a check has named the cause.
@@ -185,6 +177,19 @@ fn identify_records(
         fitted,
         summary,
     })
+}
+
+/// Returns the number of degrees of freedom, which all records must have in common.
+fn degrees_of_freedom(records: &[Windowed]) -> Result<usize, AnalysisError> {
+    let dofs = records.first().ok_or(AnalysisError::NoRecord)?.held.force.channels();
+    for record in records {
+        let got = record.held.force.channels();
+        if got != dofs {
+            let file = record.held.file.clone();
+            return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
+        }
+    }
+    Ok(dofs)
 }
 
 /// Returns the failure of a fit with the surplus of resonances as a reason.
@@ -324,7 +329,7 @@ fn spectral(
     period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
     let is_short = open_records::suit(records, unknowns);
-    let mut delayed = None;
+    let mut unfit = None;
     if !period_given && is_short {
         let noise = OpenNoise { response: likelihood.unwrap_or_default(), force: None };
         let how = open_records::How {
@@ -335,7 +340,7 @@ fn spectral(
         };
         match open_records::fit(records, unknowns, how) {
             Ok(open) if open.decides => return Ok(open.fitted),
-            Err(error @ AnalysisError::Unfit { .. }) => delayed = Some(error),
+            Err(error @ AnalysisError::Unfit { .. }) => unfit = Some(error),
             _ => {}
         }
     }
@@ -348,12 +353,15 @@ fn spectral(
     }
     let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
     let fitted = spectra::fit(records, unknowns, lines.rule(), estimator);
-    // The failed fit as open records may have shown a delay. The failure is returned if the fit of
-    // whole periods does not report a delay.
-    let is_delay = |finding: &Finding| finding.subject() == Subject::Delay;
-    let names_delay = |fitted: &Fitted| fitted.after.iter().flatten().any(is_delay);
-    match delayed {
-        Some(error) if !fitted.as_ref().is_ok_and(names_delay) => Err(error),
+    // The failed fit as open records may have shown a delay or another quantity. The failure is
+    // returned if the fit of whole periods reports neither of them.
+    let is_cause = |finding: &Finding| {
+        finding.subject() == Subject::Delay || open_records::is_of_quantity(finding)
+    };
+    let names_cause =
+        |fitted: &Fitted| fitted.after.iter().flatten().chain(&fitted.after_all).any(is_cause);
+    match unfit {
+        Some(error) if !fitted.as_ref().is_ok_and(names_cause) => Err(error),
         _ => fitted,
     }
 }

@@ -203,7 +203,8 @@ pub(super) fn fit(
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let tested =
         Tested { records: &with_pulses, closed: &closed, fit: &fit, residuals: &residuals };
-    let (better_explanation, compared) = time_limit::apart(CAUSE_OPERATIONS, || {
+    // The comparisons count no operations, but `join` leaves half of them to each of both parts.
+    let (better_explanation, compared) = time_limit::apart(2.0 * CAUSE_OPERATIONS, || {
         time_limit::join(
             || tested.cause(dt, unknowns, noise.response, excitation),
             || agreement(&data, &fit, &residuals, excitation),
@@ -322,12 +323,12 @@ impl Tested<'_> {
         excitation: Excitation<'_>,
     ) -> Result<Option<CauseWithChange>, AnalysisError> {
         let Self { records, closed, fit, residuals } = *self;
-        let all = joined(closed)?;
+        let joint = joined(closed)?;
         let system = fit.estimate.system().ok();
-        let unexplained = system.and_then(|system| unexplained_motion(&all, &system).ok()?);
+        let unexplained = system.and_then(|system| unexplained_motion(&joint, &system).ok()?);
         let quantity = if !is_noise(residuals) || unexplained > Some(CONSPICUOUS) {
             let data = joined(&fit.without_pulse_errors(records)?)?;
-            other_quantity(&data, &all, &fit.estimate)
+            other_quantity(&data, &joint, &fit.estimate)
         } else {
             None
         };
@@ -442,7 +443,7 @@ fn better_explanation(one: Option<Explanation>, other: Option<Explanation>) -> O
 }
 
 /// Returns the fraction of the residual power that remains with the explanation of a finding.
-fn remaining(finding: &Finding) -> f64 {
+pub(super) fn remaining(finding: &Finding) -> f64 {
     match finding {
         Finding::Delay(delay) => delay.remaining,
         Finding::Alternative(alternative) => alternative.remaining,
@@ -510,15 +511,18 @@ fn with_cause(
     if !matches!(error, EstimateError::NotConverged { .. }) && time_limit::ended().is_none() {
         return error.into();
     }
-    // A wrong quantity is searched last: near a resonance, a delay may have a similar effect.
-    let each = 0.5 * CAUSE_OPERATIONS;
+    let share = 0.5 * CAUSE_OPERATIONS;
     let delay = || delay_of_failed_search(records, dt, unknowns, noise);
-    let delay = time_limit::apart(each, delay)
-        .map(|delay| format!("{delay}; the search without that delay succeeds"));
+    let delay = time_limit::apart(share, delay);
     let data = joined(records).ok();
-    let cause = delay.or_else(|| {
-        let quantity = || quantity_of_failed_search(data.as_ref()?, unknowns);
-        time_limit::apart(each, quantity).map(|quantity| quantity.to_string())
+    let quantity = || quantity_of_failed_search(data.as_ref()?, unknowns);
+    let quantity = time_limit::apart(share, quantity);
+    // Near a resonance, a delay may have a similar effect as another quantity.
+    let causes = delay.into_iter().chain(quantity);
+    let cause = causes.min_by(|a, b| remaining(a).total_cmp(&remaining(b)));
+    let cause = cause.map(|cause| match cause {
+        Finding::Delay(_) => format!("{cause}; the search without that delay succeeds"),
+        _ => cause.to_string(),
     });
     let cause = cause.or_else(|| Some(delay_of_lines(&data?, dt, unknowns)?.to_string()));
     match cause {
@@ -581,7 +585,7 @@ fn remarks(
         .collect()
 }
 
-fn is_of_quantity(finding: &Finding) -> bool {
+pub(super) fn is_of_quantity(finding: &Finding) -> bool {
     let cause =
         |alternative: &Alternative| matches!(alternative.cause, Cause::RecordedQuantity { .. });
     matches!(finding, Finding::Alternative(alternative) if cause(alternative))

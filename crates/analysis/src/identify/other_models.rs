@@ -68,7 +68,7 @@ pub(super) fn with_better_model(
         AnalysisError::Estimate(error) if is_ended => error,
         failure => return failure,
     };
-    let other = time_limit::apart(CAUSE_OPERATIONS, || {
+    let better = time_limit::apart(CAUSE_OPERATIONS, || {
         let fewer = thinned::for_models(tables, how, data, unknowns)
             .and_then(|fewer| Some((on_lines_of(&fewer, how).ok()?, fewer)));
         let (data, tables) = match &fewer {
@@ -77,7 +77,7 @@ pub(super) fn with_better_model(
         };
         other_model(tables, how, data, &equation_error(data, unknowns).ok()?)
     });
-    match other {
+    match better {
         Some(Other {
             cause: cause @ (Cause::Quantity { .. } | Cause::Decibels),
             remaining,

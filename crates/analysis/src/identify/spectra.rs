@@ -11,6 +11,7 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::time_limit;
 use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
 use mechid_spectra::{
     FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, SpectraError,
@@ -22,12 +23,13 @@ use super::disagreement::Disagreement;
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::keywords::Domain;
 use super::left_out::{LineRule, all_lines};
-use super::open_records::joined;
+use super::open_records::{joined, remaining};
 use super::options::PeriodEstimator;
 use super::prediction::Prediction;
 use super::quantity::other_quantity;
 use super::remarks::{noise_remark, one_motion_of};
 use crate::AnalysisError;
+use crate::limits::CAUSE_OPERATIONS;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
@@ -89,7 +91,7 @@ pub(super) fn fit(
     // The fit ends here with an error that names the parameter if one is undetermined. Without
     // this check, a later step would fail with a less useful error.
     estimate.system()?;
-    let RecordFindings { before, after, weighted, repeats } =
+    let RecordFindings { before, mut after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
     misfit = misfit.filter(|_| repeats);
     let AfterSpectralFit { records: residuals, bias } =
@@ -100,15 +102,12 @@ pub(super) fn fit(
         agreement(&spectra, &weighted, &estimate, spectrum.as_ref())?
     };
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
-    let is_small = unknowns.free().len() <= TERM_PARAMETERS;
     let is_left = exceeds_noise(&residuals);
-    let unexplained = unexplained_motion(&data, &estimate.system()?).ok().flatten();
-    let quantity = if is_small && (is_left || unexplained > Some(CONSPICUOUS)) {
-        other_quantity(&data, &data, &estimate)
-    } else {
-        None
-    };
-    let nonlinear = if is_small && is_left && quantity.is_none() {
+    let quantity =
+        time_limit::apart(CAUSE_OPERATIONS, || quantity_of_periods(&data, &estimate, is_left));
+    let quantity = quantity.filter(|quantity| explains_more(quantity, &mut after));
+    let is_small = unknowns.free().len() <= TERM_PARAMETERS;
+    let nonlinear = if is_left && is_small && quantity.is_none() {
         nonlinear_term(records, unknowns, lines)?
     } else {
         None
@@ -132,6 +131,37 @@ pub(super) fn fit(
             .collect(),
         ..Fitted::new(Domain::Frequency, estimator, Prediction::Steady, estimate)
     })
+}
+
+/// Returns the finding that the responses are those of another quantity, if the estimate does not
+/// explain them: a test of the residual warns (`is_left`), or a conspicuous part of the response is
+/// unexplained. `None` for a fit of many parameters, because the quantities would take too long.
+fn quantity_of_periods(
+    data: &FrequencyData,
+    estimate: &Estimate,
+    is_left: bool,
+) -> Option<Finding> {
+    if estimate.unknowns().free().len() > TERM_PARAMETERS {
+        return None;
+    }
+    let system = estimate.system().ok()?;
+    let unexplained = unexplained_motion(data, &system).ok()?;
+    if !is_left && unexplained <= Some(CONSPICUOUS) {
+        return None;
+    }
+    other_quantity(data, data, estimate)
+}
+
+/// Returns whether less of the residual power remains with another quantity than with every delay
+/// in `after`, and removes these delays if so: near a resonance, both may have a similar effect.
+fn explains_more(quantity: &Finding, after: &mut [Vec<Finding>]) -> bool {
+    let is_delay = |finding: &Finding| finding.subject() == Subject::Delay;
+    let delays = after.iter().flatten().filter(|finding| is_delay(finding));
+    let explains_more = delays.map(remaining).all(|delay| remaining(quantity) < delay);
+    if explains_more {
+        after.iter_mut().for_each(|findings| findings.retain(|finding| !is_delay(finding)));
+    }
+    explains_more
 }
 
 /// Returns whether a test of a residual warns.

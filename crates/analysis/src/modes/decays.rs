@@ -9,7 +9,7 @@ use super::sources::{Recorded, all_responses};
 use super::summary::RecordRow;
 use super::{Modes, checks};
 use crate::AnalysisError;
-use crate::decay::{DecaySettings, decay, decaying_part};
+use crate::decay::{self, DecaySettings, decaying_part};
 use crate::limits::MODAL_SIGNIFICANCE;
 use crate::measurement::{Block, Measurement, check_distinct};
 
@@ -49,7 +49,7 @@ pub(super) fn modes(
 /// Returns a note if the analysis of a single decay shows that this decay is not a sum of decaying
 /// oscillations; `None` if the decay cannot be analysed alone, for example because it is too short.
 fn deviations(measurement: &Measurement, how: &DecaySettings) -> Option<String> {
-    let remarks = match decay(measurement, how) {
+    let remarks = match decay::fitted(measurement, how) {
         Ok(modes) => modes.summary().model_remarks(),
         Err(AnalysisError::FreeDecay(
             error @ (FreeDecayError::NoOscillation { .. }

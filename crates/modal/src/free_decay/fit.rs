@@ -10,7 +10,9 @@ use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::autoregression::Autoregression;
-use super::limits::{MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING, POLE_SEGMENT};
+use super::limits::{
+    MAX_DAMPING, MAX_STEPS, POLE_CHUNK, POLE_ROUNDING, POLE_SEGMENT, PRODUCT_OPERATIONS,
+};
 use super::poles::{Pole, columns, linear_columns};
 
 /// Record as samples × channels. Each channel is scaled to unit RMS about its mean; `constant`
@@ -207,7 +209,7 @@ impl Data {
         let (linear, nonlinear) = (linear_columns(poles, self.constant), 2 * poles.len());
         let columns = linear + nonlinear;
         let products = columns * (columns + 2 * self.channels());
-        time_limit::spend(2.0 * (self.len() * products) as f64);
+        time_limit::spend(PRODUCT_OPERATIONS * (self.len() * products) as f64);
         // One factorisation serves all channels.
         let from = noise.iter().map(Autoregression::order).max().unwrap_or(0);
         let common = self.triangle(poles, white, from)?;

@@ -28,6 +28,9 @@ pub(crate) const POLE_SEGMENT: usize = 4 * POLE_CHUNK;
 /// would cost time.
 pub(crate) const DEAD: f64 = 35.0;
 
+/// Number of operations, for a limit of the work, for each sample and product of two columns.
+pub(crate) const PRODUCT_OPERATIONS: f64 = 0.5;
+
 /// Maximum number of steps of a search.
 pub(crate) const MAX_STEPS: usize = 50;
 

@@ -22,7 +22,7 @@ pub use self::starts::best_output_error;
 use super::covariance::Uncertainty;
 use super::equation_error::slowest_decay;
 use super::estimate::{NamedParameter, NonlinearEstimate};
-use super::limits::SEARCH_STEPS;
+use super::limits::{SAMPLE_OPERATIONS, SEARCH_STEPS};
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
 use super::whitening::{Filter, NoisePath};
@@ -475,7 +475,7 @@ impl Residuals for Problem<'_> {
         let Some(system) = self.system(theta) else { return false };
         let directions = self.directions();
         let n = self.dof() as f64;
-        let of_number = 40.0 * n * (1.0 + directions.len() as f64);
+        let of_number = SAMPLE_OPERATIONS * n * (1.0 + directions.len() as f64);
         time_limit::spend(self.len() as f64 * of_number);
         let run = |(at, record): (usize, &Prepared)| {
             let start = self.initial(theta, at)?;

@@ -98,12 +98,12 @@ impl PartsOfFit<'_> {
     /// because such a product is limited by the memory that it reads.
     fn explained(&self, terms: Vec<(OmittedTerm, Vec<DVector<f64>>)>) -> Vec<Explained> {
         let counts: Vec<_> = terms.iter().map(|(term, columns)| (*term, columns.len())).collect();
-        let all: Vec<_> = terms.into_iter().flat_map(|(_, columns)| columns).collect();
-        if all.is_empty() {
+        let changes: Vec<_> = terms.into_iter().flat_map(|(_, columns)| columns).collect();
+        if changes.is_empty() {
             return Vec::new();
         }
-        let mut columns = DMatrix::from_columns(&all);
-        drop(all);
+        let mut columns = DMatrix::from_columns(&changes);
+        drop(changes);
         remove(&self.linear.transients, &mut columns);
         let lengths: Vec<f64> = columns.column_iter().map(|c| c.norm_squared()).collect();
         let by_parameters = self.linear.effect_of(&columns);
@@ -111,9 +111,9 @@ impl PartsOfFit<'_> {
         beyond.gemm(-1.0, &self.linear.basis, &by_parameters, 1.0);
         let mut first = 0;
         let of_term = |(term, count): (OmittedTerm, usize)| {
-            let own = first..first + count;
-            first = own.end;
-            let informing: Vec<usize> = own
+            let range = first..first + count;
+            first = range.end;
+            let informing: Vec<usize> = range
                 .filter(|at| beyond.column(*at).norm_squared() > PART_INFORMS * lengths[*at])
                 .collect();
             let [beyond, by_parameters] =
