@@ -67,8 +67,8 @@ pub enum Input {
     /// Files of the corpus with changes; some changes insert one of these texts, such as words of a
     /// format.
     Mutations(&'static [&'static str]),
-    /// Files of the corpus with few changes, or only with other numbers, so that the reader accepts
-    /// most inputs.
+    /// Files of the corpus with few changes, or with changes of numbers only: the reader accepts
+    /// most of these inputs. Some changes insert one of these texts.
     Few(&'static [&'static str]),
     /// Random bytes, from which a target draws arguments.
     Bytes,

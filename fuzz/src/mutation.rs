@@ -40,7 +40,7 @@ const NUMBERS: [&str; 24] = [
 /// Bytes with a special meaning in at least one format.
 const BYTES: &[u8] = b"\0\t\n\r\x1b \"#'+,-.:;[]{}\x7f\x80\xff";
 
-/// Longest input of random bytes.
+/// Maximum length of an input of random bytes, in bytes.
 const MOST_BYTES: usize = 1 << 10;
 
 /// Returns an input of random bytes.
@@ -55,15 +55,16 @@ pub fn bytes(random: &mut impl Rng) -> Vec<u8> {
 pub fn renumbered(corpus: &[Vec<u8>], random: &mut impl Rng) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();
     let is_text = !input.iter().take(1 << 9).any(|byte| *byte == 0 || *byte >= 0x80);
+    let len = input.len();
     let most = 1 << random.random_range(0..10);
     for _ in 0..random.random_range(1..=most) {
-        let at = random.random_range(0..input.len().max(1));
+        let at = random.random_range(0..len.max(1));
         match input.get_mut(at) {
             Some(byte) if is_text && byte.is_ascii_digit() => {
                 *byte = b'0' + random.random_range(0..10_u8);
             }
             // The numbers of a binary file are mostly at its end.
-            Some(byte) if !is_text && 2 * at > most => *byte = random.random(),
+            Some(byte) if !is_text && 2 * at > len => *byte = random.random(),
             _ => {}
         }
     }
@@ -161,7 +162,8 @@ fn change(input: &mut Vec<u8>, corpus: &[Vec<u8>], words: &[&str], random: &mut 
     }
 }
 
-/// Replaces `len` bytes from `at` on, or as many as the input still has.
+/// Replaces `len` bytes, beginning at position `at`, by the bytes `by`; replaces fewer if the input
+/// ends earlier.
 fn replace(input: &mut Vec<u8>, at: usize, len: usize, by: &[u8]) {
     let end = (at + len).min(input.len());
     input.splice(at..end, by.iter().copied());

@@ -1,6 +1,6 @@
 //! A rig test simulated on the nonlinear film of a short bearing; the true coefficients follow from
 //! the geometry. At small amplitudes the test finds the coefficients of the linear film, at large
-//! amplitudes it does not. A rotor on this film whirls above its threshold.
+//! amplitudes it does not. A rotor on this film whirls if its mass exceeds the critical mass.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -85,8 +85,8 @@ fn settings() -> IdentifyBearing {
     IdentifyBearing { stator_mass: MASS, coefficients, ..IdentifyBearing::default() }
 }
 
-/// Bearing that a linear test finds at an amplitude in newtons per line; `part` is the ratio of the
-/// noise to the RMS of the motion.
+/// Bearing that the linear fit identifies from a rig test with a force of `amplitude` newtons per
+/// line; `part` is the ratio of the RMS of the noise to that of the motion.
 fn identified(lines: &[usize], amplitude: f64, part: f64) -> IdentifiedBearing {
     let test = |along: usize| {
         let repeats = if part > 0.0 { 8 } else { 1 };
@@ -177,8 +177,8 @@ fn the_bias_over_amplitude_is_what_the_book_says() {
     );
     let [mut of_all, mut of_odd] = [(); 2].map(|()| Vec::<[f64; 3]>::new());
     for amplitude in [0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2] {
-        // There are half as many odd lines; the factor √2 of their amplitudes gives the same total
-        // power.
+        // Only half of the lines are odd; the factor √2 of their amplitudes gives the same total
+        // power as that of all lines.
         let (a, b) = (bias(&all(), amplitude), bias(&odd(), 2_f64.sqrt() * amplitude));
         let [[at, k, c], [odd_at, odd_k, odd_c]] = [a, b];
         table +=
@@ -230,8 +230,8 @@ fn critical() -> (f64, f64) {
     (threshold.critical_mass().unwrap(), threshold.whirl_frequency_ratio().unwrap())
 }
 
-/// Growth rate of a small whirl of the nonlinear rotor, in 1/s, from two successive sections of ten
-/// whirl periods each.
+/// Growth rate, in 1/s, of a small whirl of a rotor on the nonlinear film, from two successive
+/// sections of ten whirl periods each. The rotor has `masses` times the critical mass.
 fn growth(masses: f64) -> f64 {
     let x = released_orbit(masses, 1e-5, 60);
     let rest = geometry().1;

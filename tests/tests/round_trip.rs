@@ -86,7 +86,8 @@ fn an_exact_record_goes_through_a_file_to_the_machine() {
         .unwrap();
         let found = equation_error(&data, &Unknowns::unknown_mass(dof).unwrap()).unwrap();
         let found = found.system().unwrap();
-        // The error is rounding of the transform times the condition number of the fit, below 1e4.
+        // The error is the rounding error of the transform, multiplied by the condition number of
+        // the fit, which is below 1e4.
         assert!(largest_difference(found.mass(), system.mass()) < 1e-9);
         assert!(largest_difference(found.damping(), system.damping()) < 1e-9);
         assert!(largest_difference(found.stiffness(), system.stiffness()) < 1e-9);
@@ -115,7 +116,8 @@ fn newmark_is_identified_as_the_trapezoidal_rule() {
         let measured = data.displacement()[(row, 0)] / data.force()[(row, 0)];
         assert!((measured - expected).norm() < 1e-10 * expected.norm(), "line {}", row + 1);
     }
-    // At up to 1.47 rad per step the warping of the frequency visibly changes the mass found.
+    // The highest line has 1.47 rad per step, and at such steps the frequency warping changes the
+    // identified mass by more than 1 %.
     let found = equation_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
     assert!((found.mass()[0] / 10.0 - 1.0).abs() > 0.01);
 }

@@ -15,8 +15,8 @@ fn a_loss_of_coverage_is_noticed() {
     assert!(alarms_now.is_empty(), "{}", alarms_now.join("\n"));
     let differences = differences(root, &coverages).unwrap();
     assert!(differences.is_empty(), "{}", differences.join("\n"));
-    // The same experiments, but with fewer intervals that contain the true value: by 2 % of the
-    // number of experiments.
+    // The same experiments, but the number of intervals that contain the true value is reduced by 2
+    // % of the number of experiments.
     let lost = coverages.into_iter().map(|of| {
         let containing_truth = of.containing_truth - (LOSS * of.experiments as f64) as u64;
         Coverage { containing_truth, ..of }

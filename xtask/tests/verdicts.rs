@@ -25,8 +25,9 @@ fn every_cell_with_known_settings_is_explained() {
     let (published, rows) = reproduced();
     // 1,990 printed estimates less the 20 of Appendix B, whose integrator the text does not name.
     assert_eq!(rows.len(), 1970);
-    // Number of estimates with each verdict: to the digit; rounded twice (5.3.3, NPI 21.4);
-    // misprints (4936, and three columns without their sign); unexplained.
+    // Number of estimates with each verdict: equal to the digit; rounded twice (table 5.3.3, NPI
+    // 21.4); misprints (one cell with 4936 for 4963, and three columns whose sign is lost);
+    // unexplained.
     assert_eq!(counts(rows.iter().map(|r| &r.estimate)), [1938, 1, 31, 0]);
     assert_eq!(counts(rows.iter().map(|r| &r.error)), [1934, 0, 36, 0]);
     let tables: Vec<&str> = published.tables().collect();

@@ -32,7 +32,8 @@ impl Extremes {
         self.samples += values.len();
     }
 
-    /// Returns the indices of samples, counted from 0, and their values, in the order of time.
+    /// Returns the index (counted from 0) and the value of the smallest and of the largest sample
+    /// of each section, in the order of time.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
         self.extremes.iter().flat_map(|cell| {
             let mut cell = *cell;

@@ -73,7 +73,7 @@ impl HitRow {
 }
 
 impl HitRow {
-    /// Returns number, peak and time in words.
+    /// Returns the number, the largest force and the time of the hit, as text.
     fn brief(&self) -> String {
         let (peak, time) = (significant(self.peak, 3), significant(self.time_s, 4));
         format!("hit {}, {peak} N at {time} s", self.number)
@@ -171,7 +171,8 @@ pub(crate) struct Cut {
     /// Noise of the force, one entry for each record in `hits`.
     pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
-    /// Number of good hits of each record; records in memory all have the same name.
+    /// Number of good hits of each record, in the order of the records: records in memory all have
+    /// the same name, so a name does not identify a record.
     pub used: Vec<usize>,
     pub remarks: Vec<String>,
 }

@@ -8,16 +8,16 @@
 use crate::AnalysisError;
 use crate::measurement::Reading;
 
-/// Bytes of memory per number of a record for an inspection: the column, its spectrum and its lags,
-/// for several columns at a time.
+/// Bytes of memory per number of a record for an inspection: the column, its spectrum and, for the
+/// search of a period, its mismatch at every lag; for several columns at a time.
 pub const INSPECT_BYTES: usize = 96;
 
 /// Bytes of memory per number of a section of a record: for the identification from spectra or
 /// sample by sample, and for frequency responses.
 pub const STRETCH_BYTES: usize = 256;
 
-/// Bytes of memory per number of a window that is analysed as a whole, as for nonlinear terms, the
-/// separation of hits, and derivatives of a whole period.
+/// Bytes of memory per number of a window that is analysed as a whole, for example for nonlinear
+/// terms, for the separation of hits, or for derivatives of a whole period.
 pub const WHOLE_BYTES: usize = 640;
 
 /// Minimum number of bytes of memory per number of a record whose transient is fitted: one force
@@ -51,8 +51,8 @@ pub const TABLE_BYTES: usize = 3000;
 /// took 400 bytes.
 pub const TABLE_DOF_BYTES: usize = 400;
 
-/// Bytes of memory per number of a table of frequency responses and unknown: three copies of the
-/// sensitivities of the real and the imaginary part.
+/// Bytes of memory for each number (line, force and response) of a table of frequency responses,
+/// per unknown: three copies of the sensitivities of the real and the imaginary part.
 pub const TABLE_SENSITIVITY_BYTES: usize = 48;
 
 /// Largest memory of the sensitivities of a table of frequency responses, in bytes; larger
@@ -60,7 +60,8 @@ pub const TABLE_SENSITIVITY_BYTES: usize = 48;
 pub const TABLE_SENSITIVITIES: usize = 3 << 27;
 
 /// Bytes of memory per pair of unknowns of a fit: the normal equations, their factor and the
-/// covariance of the unknowns. The search alone took 16 bytes with 4800 unknowns.
+/// covariance of the unknowns. The search, which needs no covariance, took 16 bytes per pair with
+/// 4800 unknowns.
 pub const UNKNOWN_PAIR_BYTES: usize = 32;
 
 /// Bytes of memory per number of a table whose modes are identified: 1, 64 and 400 responses took
@@ -72,8 +73,8 @@ pub const MODAL_TABLE_BYTES: usize = 3200;
 pub const MODAL_PAIR_BYTES: usize = 40;
 
 /// Number of operations of the searches of an analysis for each byte of memory that its files may
-/// use, without a time limit. For a file of 1 MB it is twice what nine degrees of freedom took with
-/// a right model, and some twenty seconds on two processors with a wrong one.
+/// use, without a time limit. With a wrong model, records of 0.7 to 1 MB then end after 10 to 30 s
+/// on two processors.
 pub const OPERATIONS_PER_BYTE: f64 = 30.0;
 
 /// Additional operations for the search for the cause of a bad fit, relative to the limit of the
@@ -114,8 +115,8 @@ pub const REST_DECAY: f64 = 7.0;
 /// of the number of samples of the record. This limits the memory.
 pub const REST_RECORDS: usize = 8;
 
-/// Minimum relative uncertainty of the standard errors for a remark: 12 degrees of freedom give an
-/// uncertainty of about 20 %.
+/// Relative uncertainty of the standard errors above which a remark reports it; 12 degrees of
+/// freedom give about 20 %.
 pub(crate) const UNCERTAIN_ERROR: f64 = 0.2;
 /// Minimum share of the variance of a response that the modes of a test must explain and, in a
 /// validation, predict. With a smaller share, most of the response has another cause, and the
@@ -128,9 +129,9 @@ pub const LEAST_EXPLAINED: f64 = 0.5;
 /// middle instead.
 pub const SMALLER_HALF: f64 = 0.25;
 
-/// Minimum number of modes of an ambient record with frequencies within one half-width ζf that
-/// indicates a spectral peak of the unmeasured forces. Two modes may be a close pair, as in a
-/// symmetric tower; a force with a peak gives one mode for each independent force.
+/// Minimum number of modes within one half-width ζf that indicates a spectral peak of the
+/// unmeasured forces of an ambient record. Two such modes may be a close pair of the structure, for
+/// example of a symmetric tower. A spectral peak gives one mode for each independent force.
 pub const CROWDED_MODES: usize = 3;
 
 /// Minimum ratio of the power of a force, averaged over [`DRIVEN_LINES`] lines, to its largest
@@ -209,8 +210,8 @@ pub(crate) fn check_bytes(
 
 /// Returns the setting `memory_gb` in bytes.
 pub(crate) fn memory_bytes(reading: &Reading) -> Option<usize> {
-    // The conversion saturates: a huge number becomes the largest integer, NaN and negative numbers
-    // 0.
+    // The conversion saturates: a huge number becomes the largest integer; NaN and negative numbers
+    // become 0.
     reading.memory_gb.map(|gb| (gb * GIGABYTE) as usize)
 }
 
@@ -218,10 +219,11 @@ pub(crate) fn memory_bytes(reading: &Reading) -> Option<usize> {
 /// modes of a larger machine are computed with `modes`.
 pub(crate) const LISTED_MODES_DOF: usize = 30;
 
-/// Minimum share of the prior in the information about a parameter for a remark.
+/// Share of the prior in the information about a parameter above which a remark reports it.
 pub(crate) const PRIOR_SHARE: f64 = 0.5;
 
-/// Maximum relative difference of two equal frequencies in tables, which have few digits.
+/// Maximum relative difference of two frequencies that count as equal, because tables give
+/// frequencies with few digits.
 pub(crate) const SAME_FREQUENCY: f64 = 1e-6;
 
 /// Largest 1 − coherence (median over the lines) of a table that states no noise: a smaller value

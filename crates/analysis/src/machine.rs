@@ -184,7 +184,8 @@ impl Machine {
 struct Named {
     /// Channels of records.
     channels: Option<Channels>,
-    /// Points of frequency responses measured elsewhere, if force and response share them.
+    /// Points of a table of frequency responses, one per degree of freedom. Without `channels`,
+    /// they name the forces and the displacements.
     points: Option<Vec<String>>,
 }
 

@@ -247,8 +247,8 @@ impl Augmented {
         Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
     }
 
-    /// Returns the lowest corner frequency, in radians per sample: half its period is twenty times
-    /// the length of the record.
+    /// Returns the lowest corner frequency, in radians per sample: its period is forty times the
+    /// length of the record.
     fn lowest(&self) -> f64 {
         0.05 * PI / self.sampling.len() as f64
     }
@@ -283,7 +283,8 @@ impl Augmented {
             if gain.is_none_or(|gain| gain > 0.0) {
                 best = Some(tuned);
             }
-            // If twice the order brings no gain, four times the order does not either.
+            // Higher orders do not bring more if an order brings too little gain over the lower
+            // orders.
             if order > 4 && gain.is_some_and(|gain| gain < limits::ORDER_GAIN) {
                 break;
             }

@@ -16,9 +16,9 @@ use crate::state_space::exact_transition;
 /// The state z = [x; ẋ] obeys the discretised equation z(k+1) = Φ z(k) + Γ F(k), and the velocity
 /// rows are solved for F(k); Euler's Γ is zero in the displacement rows. A held force of an open
 /// record has one sample less than the response. For a linear force, z(k+1) = Φ z(k) + Γ₀ F(k) + Γ₁
-/// (F(k+1) − F(k)), and all 2n rows together give F at both ends of each step; at an inner sample,
-/// the result is the mean of its two values. There is no recursion along the record, so that no
-/// error grows along it.
+/// (F(k+1) − F(k)), and all 2n rows together give F at both ends of each step. An inner sample
+/// belongs to two steps; its force is the mean of the two values. There is no recursion along the
+/// record, so that no error grows along it.
 ///
 /// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by 6M/Δt²
 /// (linear). Euler's rule is not exact for any motion: at a line ω it returns the force times the
@@ -173,8 +173,8 @@ fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceEr
     let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
     let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
     // For the state (x, Δt·ẋ), the input matrix of a short step is about I. The smallest singular
-    // value is therefore divided by the largest one, but by at least 1: for a single force,
-    // smallest and largest are equal.
+    // value is divided by the largest one or by 1, whichever is larger. With a single force,
+    // smallest and largest are equal, and their ratio would always be 1.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < limits::NOT_TRANSMITTED {
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });

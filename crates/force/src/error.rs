@@ -172,7 +172,7 @@ pub enum ForceError {
     NotPositive {
         /// Name of the number.
         what: &'static str,
-        /// The value found, in the unit of that number.
+        /// Invalid value of the number, in the unit of that number.
         value: f64,
     },
     /// An open record has more unknowns than the limit.

@@ -33,8 +33,9 @@ pub(crate) struct Posterior {
 }
 
 impl Posterior {
-    /// Averages over the likely values of reach and colour and, for each of these, over share and
-    /// variances. If the noise is known, the noise variance is 1.
+    /// Computes the posterior: the likely values of reach and colour, for each of them the likely
+    /// values of share and variances, and the weight of each combination. If the noise is known,
+    /// the noise variance is 1.
     pub fn from_components(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
         let white = Evidence::most_likely(components, limits::COLOURS[0], noise);
@@ -96,8 +97,9 @@ impl Posterior {
         weighted.sum()
     }
 
-    /// Returns the frequency, in Hz, below which noise hides a force as strong as the driven
-    /// components; `None` if noise hides it in every component.
+    /// Returns the frequency, in Hz, below which noise hides the force, if the force is as strong
+    /// in every component as in the driven components; `None` if noise hides the force in every
+    /// component.
     pub fn lowest_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
         components.lowest_hz(|i| {
@@ -108,14 +110,16 @@ impl Posterior {
 }
 
 impl Evidence {
-    /// Returns the parameters with the most likely reach: a coarse descent, then smaller steps
-    /// around the best reach.
+    /// Returns the parameters with the most likely reach (number of the strongest components that
+    /// may carry a force). The search takes coarse steps down from all components, then smaller
+    /// steps around the best reach.
     fn most_likely(components: &Components, colour: i32, noise: Option<f64>) -> Self {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        // The reach is searched only for a white force. The spectrum of a coloured force falls
-        // without a limit, so a coloured force reaches all components.
+        // The reach, the number of components that may carry a force, is searched only for a white
+        // force. A coloured force has a spectrum that falls, but does not end, so it reaches all
+        // components.
         while colour == 0 && reach > 2 {
             reach = ((reach as f64 * limits::REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -136,8 +140,9 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Adds this reach and the neighbouring reaches whose likelihood is not negligible. The weight
-    /// of a reach is the number of reaches that it represents.
+    /// Adds this reach (number of the strongest components that may carry a force) and the
+    /// neighbouring reaches whose likelihood is not negligible. The weight of a reach is the number
+    /// of reaches that it represents.
     fn add_neighbouring_reaches(
         self,
         components: &Components,
@@ -200,7 +205,8 @@ impl Evidence {
         };
         let points = posterior_points(&best, |point| {
             let trial = at(point);
-            // A uniform prior of the share is not uniform in the logarithm of the odds.
+            // The prior is uniform in the share. Its density in the logarithm of the odds is
+            // share·(1 − share).
             let prior = trial.share.ln() + (1.0 - trial.share).ln();
             Some(trial.log_likelihood(components) + prior).filter(|value| value.is_finite())
         })?;
@@ -286,8 +292,8 @@ impl Evidence {
         [50, 5].map(|part| per_datum[per_datum.len() / part].max(f64::MIN_POSITIVE)).to_vec()
     }
 
-    /// Fits a force that drives every component within reach. The ratio σ/τ is searched on a grid,
-    /// and gives both variances.
+    /// Fits a force that drives all of the `reach` strongest components. The ratio of the noise
+    /// variance to the force variance is searched on a grid, and gives both variances.
     fn white(self, components: &Components, noise: Option<f64>) -> Self {
         let (data, tail) = (components.data(), tail_energy(components, self.reach));
         let shown = |i: usize| {

@@ -21,7 +21,7 @@ pub(crate) struct ForceInformation {
     least_hz: f64,
 }
 
-/// Information within an interval of angular frequencies.
+/// Information of the measured channels on the forces, in one interval of angular frequencies.
 struct Term {
     omega: f64,
     width: f64,
@@ -30,7 +30,7 @@ struct Term {
     information: Option<DMatrix<Complex<f64>>>,
 }
 
-/// Remaining uncertainty of each force, by frequency.
+/// Error variance that each force has after the measurement, by frequency.
 pub(crate) struct ErrorSpectrum {
     /// Lower and upper end of each interval, in Hz.
     edges: Vec<[f64; 2]>,
@@ -53,8 +53,8 @@ impl ForceInformation {
         let transfer = Transfer { system, channels: measured.channels(), forced, scale };
         let (count, nyquist) =
             (sampling.len().min(limits::INFORMATION_FREQUENCIES), PI / sampling.dt());
-        // The frequencies are half a line apart if there are few lines; otherwise they become
-        // denser towards 0.
+        // The frequencies are half a line spacing apart if there are few lines; otherwise they
+        // become denser towards 0.
         let lowest = 0.5 * sampling.omega0();
         let bend = if sampling.len() > limits::INFORMATION_FREQUENCIES { 3 } else { 1 };
         let at = |i: usize| {
@@ -77,7 +77,8 @@ impl ForceInformation {
         Ok(Self { terms, channels: scale.len() as f64, dt: sampling.dt(), least_hz })
     }
 
-    /// Returns the mean RMS value of the scaled channels due to a force of this spectrum alone.
+    /// Returns the root mean square of the response to force `f` alone, over time and all scaled
+    /// channels; the force has the spectrum of this model.
     pub fn gain(&self, model: &ForceModel, process: &LowPass, f: usize) -> f64 {
         let shown = self.terms.iter().filter_map(|Term { omega, width, information }| {
             let power = information.as_ref()?[(f, f)].re / self.channels;
@@ -103,8 +104,8 @@ impl ForceInformation {
                 is_determined.push(true);
                 continue;
             };
-            // In units of the density S_f of each force, the uncertainty is (I + D HᴴH D)⁻¹ with D²
-            // = S_f/S_n.
+            // If each force is divided by the root of its spectral density S_f, the spectral
+            // density of its error is a diagonal entry of (I + D HᴴH D)⁻¹, with D² = S_f/S_n.
             let density: Vec<f64> =
                 (0..forces).map(|f| model.density(f, *omega, process)).collect();
             let root = |f: usize| (density[f] / (noise * noise * self.dt)).sqrt();

@@ -107,8 +107,9 @@ impl LowPass {
 }
 
 /// Returns the covariance, due to white noise, of the state of u̇ = A u + noise after a unit of
-/// time: a series gives the covariance after a short step, and the step is doubled until it covers
-/// the unit. Only sums of squares are added.
+/// time: a series gives the covariance after a short step, and the step is doubled until it is one
+/// unit of time. Each doubling adds a positive semidefinite matrix, so the variances lose no digits
+/// by cancellation.
 ///
 /// # Source
 /// Van Loan (1978) for the integral; doubling as in Higham (2008), *Functions of Matrices*, 10.3.
@@ -146,7 +147,8 @@ pub(crate) fn step_noise(
 mod tests {
     use super::*;
 
-    /// Reference: the closed form of ∫ dω / (1 + ω^2p), and the covariance equation.
+    /// A low-pass of every order has unit variance: the closed form of ∫ dω / (1 + ω^2p) gives the
+    /// intensity of its noise, and its covariance satisfies the covariance equation.
     #[test]
     fn low_passes_have_unit_variance_and_their_spectrum() {
         for order in 1..=ForceModel::MOST {

@@ -92,9 +92,10 @@ pub fn frequency_domain(
 
 /// Mean squares, over a period, of the errors of the forces and of the residual.
 struct Variance {
-    /// Contribution of the channel noise, whose standard deviation is `scale`, to each force.
+    /// Contribution of the channel noise, whose standard deviation is `scale`, to the mean square
+    /// error of each force, in N².
     noise: Vec<f64>,
-    /// Contribution of the uncertainty of the system to each force.
+    /// Contribution of the uncertainty of the system to the mean square error of each force, in N².
     system: Vec<f64>,
     /// Contribution of the uncertainty of the system to the residual of each channel,
     /// `1 × channels`.

@@ -60,7 +60,8 @@ impl IdentifiedForce {
         Self { record, spectrum: OnceLock::new(), ..self }
     }
 
-    /// Returns the same force, restricted to this band.
+    /// Returns the same force with the statement that its record and its standard error cover only
+    /// this band.
     pub(crate) fn with_band(mut self, band_hz: [f64; 2]) -> Self {
         self.band_hz = Some(band_hz);
         self

@@ -78,9 +78,10 @@ pub struct KalmanForce {
 /// ([`IdentifiedForce::band_hz`]), unless the measurement has its own band
 /// ([`Measurement::in_band`]). A force whose spectrum is not one band, such as a weaker force in
 /// addition to a strong sinusoid, has correlated prediction errors
-/// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The standard error
-/// in a band is its value far from the ends of the record, plus the excess of the error of the
-/// whole force: its value at the instant minus its median over the record.
+/// ([`KalmanForce::whiteness_p_value`]); the standard error is then too small. The variance of the
+/// force in a band is the sum of three terms: its value far from the ends of the record; the
+/// variance of the whole force at each instant minus its median over the record, if positive; and
+/// the variance of slower errors that leak into the band at the ends of the record.
 ///
 /// Cost: linear in the record. With c channels and m = 2n + (order × forces) states, a pass takes
 /// about 2m³ + 2cm² operations per sample until the variances converge, then m² + 2cm; tuning takes
@@ -193,9 +194,10 @@ fn quiet_part_noise(
     alone.noise_without_force().filter(|noise| *noise > 0.0 && noise.is_finite())
 }
 
-/// Returns the part of the force in a band. Its variance has three parts: the variance far from the
-/// ends of the record, the excess of the variance of the whole force (its value at each instant
-/// minus its median), and the slower errors that leak into the band at the ends of the record.
+/// Returns the part of the force in a band. The variance of this part is the sum of three terms:
+/// the variance in the band far from the ends of the record; the variance of the whole force at
+/// each instant minus its median over the record, if positive; and the variance of slower errors
+/// that leak into the band at the ends of the record.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],

@@ -6,20 +6,23 @@
 /// Step for the curvature of the likelihood, whose parameters are logarithms.
 pub(crate) const CURVATURE_STEP: f64 = 0.15;
 
-/// Standard deviation of a logarithm that the measurement does not determine.
+/// Maximum posterior standard deviation of the logarithm of a parameter. A parameter that the
+/// measurement does not determine has this value.
 pub(crate) const UNDETERMINED_LOGARITHM: f64 = 1.5;
 
 /// Standard deviation of the logarithm of a parameter; if all deviations are smaller, only the best
 /// point is used. The effect of such a deviation on a standard error is at most a hundredth.
 pub(crate) const NARROW_POSTERIOR: f64 = 0.02;
 
-/// Maximum logarithm of the ratio of the likelihood of a posterior point to its approximation.
+/// Maximum logarithm of the weight of a posterior point before normalisation; a larger weight is
+/// reduced to this maximum. The weight is the likelihood at the point, divided by Laplace's
+/// approximation of the likelihood.
 pub(crate) const POINT_WEIGHT: f64 = 1.0;
 
 // Kalman filter
 
-/// Orders of the force model that are tried. The search for each starts from the best point of the
-/// previous order; the first two start from a grid.
+/// Orders of the force model that are tried. The search for orders 1 and 2 starts from a grid; the
+/// search for a higher order starts from the best point of the previous order.
 pub(crate) const FORCE_ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// Minimum gain in log-likelihood of the force model with an order above 4, relative to the best
@@ -67,8 +70,8 @@ pub(crate) const SERIES_TERMS: usize = 18;
 /// response changes little, except at a narrow resonance, where the force is known best.
 pub(crate) const INFORMATION_FREQUENCIES: usize = 1024;
 
-/// Minimum number of periods that the slowest force has in the record, if the channels do not show
-/// a constant force. The unknown mean affects slower forces.
+/// Number of periods in the record at the lowest frequency of an identified force, if the channels
+/// do not show a constant force. Below this frequency, the unknown mean affects the force.
 pub(crate) const SLOWEST_PERIODS: f64 = 2.0;
 
 // Limits for the likelihood of the components.
@@ -81,17 +84,18 @@ pub(crate) const COLOURS: [i32; 3] = [0, 1, 2];
 /// [`COLOUR_GAIN`], because the amplitudes of few components may follow a slope by chance.
 pub(crate) const COLOUR_COMPONENTS: f64 = 16.0;
 
-/// Minimum gain in the log-likelihood by a colour if fewer than [`COLOUR_COMPONENTS`] components
-/// are driven; a smaller gain may be chance.
+/// Minimum gain in log-likelihood of a coloured force over a white force, if the white force drives
+/// fewer than [`COLOUR_COMPONENTS`] components; a smaller gain may be chance.
 pub(crate) const COLOUR_GAIN: f64 = 6.0;
 
-/// Ratio of successive reaches of the first search, which starts at all components.
+/// Ratio of successive reaches (numbers of components that may carry a force) in the coarse search,
+/// which starts with all components.
 pub(crate) const REACH_RATIO: f64 = 0.8;
 
 /// Maximum number of EM rounds; a few dozen are typical.
 pub(crate) const EM_ROUNDS: usize = 300;
 
-/// Change of the log-likelihood in a round at which the iteration ends.
+/// Change of the log-likelihood in one EM round; below it the iteration ends.
 pub(crate) const EM_CHANGE: f64 = 1e-3;
 
 /// Maximum difference to the largest log-likelihood; a reach or colour with a larger difference has
@@ -102,12 +106,13 @@ pub(crate) const NEGLIGIBLE_LIKELIHOOD: f64 = 6.0;
 /// weights of all possible reaches.
 pub(crate) const ENDLESS_PRIOR: f64 = 0.25;
 
-/// Number of reaches on either side of the best reach that are averaged.
+/// Maximum number of neighbouring reaches, on each side of the best reach, that are averaged with
+/// it. A reach is the number of the strongest components that may carry a force.
 pub(crate) const NEIGHBOURING_REACHES: usize = 16;
 
 /// Minimum share of components with a force for the force to count as a band; below it the force
 /// consists of single lines. The components without a force then determine where the lines are, and
-/// the reach adds no information.
+/// neighbouring reaches are not averaged.
 pub(crate) const BAND_SHARE: f64 = 0.5;
 
 /// Minimum number of components with a force for the force to count as a band; below it the force
@@ -129,12 +134,14 @@ pub(crate) const CORNER_NOISE_RATIO: f64 = 2.0;
 /// Smallest relative change of residual and force for which a step of λ counts as effective.
 pub(crate) const LAMBDA_EFFECT: f64 = 1e-3;
 
-/// Smallest fraction of the data that truncation must leave as a residual: with a smaller one, a
-/// few data that are small by chance would look like a perfect fit.
+/// Minimum ratio of remaining data (data − unknowns) to all data for a threshold of truncation. If
+/// the ratio is smaller, the threshold does not count: a few data that are small by chance would
+/// look like a perfect fit.
 pub(crate) const TRUNCATION_RESIDUAL: f64 = 0.1;
 
-/// Smallest fraction of the data that Tikhonov's factors must leave as a residual: with a smaller
-/// one, the residual of data without noise would be only rounding, and rounding would determine λ.
+/// Minimum ratio of remaining data (data − unknowns) to all data for a λ of Tikhonov's filter. If
+/// the ratio is smaller, the λ does not count: the residual of data without noise would be only
+/// rounding, and rounding would determine λ.
 pub(crate) const TIKHONOV_RESIDUAL: f64 = 1e-4;
 
 /// Largest relative difference of costs that count as equal.
@@ -149,13 +156,13 @@ pub(crate) const HALF_WIDTH_CHANGE: f64 = 1e-12;
 
 // Transmission and uncertainty
 
-/// Reciprocal condition at which a line or a step does not transmit a force: 16 digits of the
-/// response would leave fewer than four for the force.
+/// Minimum reciprocal condition number of a line or a time step; below it a force counts as not
+/// transmitted. A force from a response with 16 digits would then have fewer than four digits.
 pub(crate) const NOT_TRANSMITTED: f64 = 1e-12;
 
 /// Largest growth of the free response over the record, as a natural logarithm: a factor of 10⁶.
-/// With more growth the impulse responses that begin late have too few digits: above 10⁸ the
-/// identified force is entirely wrong.
+/// With more growth, the responses to late impulses have too few digits: above 10⁸ the identified
+/// force is entirely wrong.
 pub(crate) const FREE_GROWTH: f64 = 14.0;
 
 /// Tolerance for rounding at the ends of a band, in line spacings.

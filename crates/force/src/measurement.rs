@@ -77,7 +77,8 @@ impl Measurement {
         Self { record, channels, band_hz: None }
     }
 
-    /// The measured samples × channels, in m, m/s or m/s² as each channel's quantity says.
+    /// Measured record, samples × channels; each channel is in the unit of its quantity: m, m/s or
+    /// m/s².
     pub fn record(&self) -> &Record {
         &self.record
     }

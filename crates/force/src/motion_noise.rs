@@ -22,7 +22,7 @@ pub struct MotionNoise {
 
 impl MotionNoise {
     /// Creates standard deviations of the displacement (m), velocity (m/s) and acceleration (m/s²)
-    /// of every degree of freedom; the list of an acceleration that was not measured is empty.
+    /// of every degree of freedom. If the acceleration was not measured, its list is empty.
     ///
     /// # Errors
     /// [`ForceError::NotPositive`] for a level that is not positive and finite.
@@ -127,7 +127,8 @@ pub fn discretised_with_noise(
     let sides = sides(&Solution::from_rule(system, response.sampling().dt(), discretisation)?);
     let samples = force.record().len();
     let at = |k: usize| error(system, response.sampling(), &sides, extent, noise, k);
-    // The errors of all samples between the ends are equal, so three samples represent all.
+    // All samples between the first and the last have the same standard error, so only three errors
+    // are computed.
     let distinct = [at(0), at(1.min(samples - 1)), at(samples - 1)];
     let error = DMatrix::from_fn(samples, system.dof(), |k, i| {
         distinct[if k == 0 { 0 } else { 1 + usize::from(k + 1 == samples) }][i]

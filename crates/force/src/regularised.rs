@@ -62,9 +62,10 @@ pub struct RegularisedForce {
 /// given λ ([`Rule::Given`](crate::Rule::Given)) the standard error belongs to a force of variance
 /// (noise/λ)² in every component; for truncation it covers only the noise.
 ///
-/// Channels without a displacement do not show a constant force. The force is then restricted to
-/// frequencies above [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the
-/// measurement has its own band ([`Measurement::in_band`]).
+/// For a structure on springs, accelerations and velocities do not show a constant force. Without a
+/// measured displacement, the force is therefore restricted to frequencies above
+/// [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the measurement has
+/// its own band ([`Measurement::in_band`]).
 ///
 /// Cost: a period takes one small SVD per line; an open record of N samples and p forces takes
 /// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`](crate::OPEN_UNKNOWNS)
@@ -236,7 +237,8 @@ impl Choice {
 /// Half width of the two-sided interval of a normal variable with probability [`CONFIDENCE`], in
 /// standard deviations.
 const TWO_SIDED: f64 = 1.959_963_984_540_054;
-/// Limit of the one-sided interval, in standard deviations.
+/// Limit of the one-sided interval of a normal variable with probability [`CONFIDENCE`], in
+/// standard deviations.
 const ONE_SIDED: f64 = 1.644_853_626_951_472;
 const CONFIDENCE: f64 = 0.95;
 /// Returns half the width of the interval about 0 that contains a normal variable of this mean and
@@ -283,7 +285,8 @@ mod tests {
         let width = half_width(1.0, 1.0);
         assert!((2.6..2.7).contains(&width), "{width}");
         assert_eq!(half_width(3.0, 0.0), 3.0);
-        // The interval contains 95 % at any offset.
+        // The interval contains 95 % of the probability for any ratio of mean to standard deviation
+        // (`offset`).
         let below = |x: f64| 0.5 * erfc(-x * std::f64::consts::FRAC_1_SQRT_2);
         for step in 0..=400 {
             let offset = 0.02 * f64::from(step);

@@ -17,10 +17,10 @@ pub enum Rule {
     /// The λ whose force is nearest to the posterior mean of the force.
     ///
     /// This mean needs the variances of force and noise, the colour of the force, the number of the
-    /// strongest components, and the share of them that the force drives; all these values are
-    /// those of maximum likelihood. This is the recommended rule, and the only rule here that
-    /// minimises the error of the force instead of the error of the response. The book
-    /// (`studies/force.md`) compares it with the other rules.
+    /// strongest components that may carry a force, and the share of these components that does
+    /// carry a force. All these values are those of maximum likelihood. This is the recommended
+    /// rule, and the only rule here that minimises the error of the force instead of the error of
+    /// the response. The book (`studies/force.md`) compares it with the other rules.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///
@@ -131,9 +131,9 @@ fn grid(largest: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Returns one threshold per distinct singular value above rounding: the middle between this
-/// singular value and the next one, in the logarithm. If the singular value itself were the
-/// threshold, the smallest change of the system could exclude its component.
+/// Returns one threshold per distinct singular value above rounding: the geometric mean of this
+/// singular value and the next one. If the singular value itself were the threshold, the smallest
+/// change of the system could exclude its component.
 fn thresholds(components: &Components) -> Vec<f64> {
     let transmitted = components.transmitted();
     let mut values = components.singular[..transmitted].to_vec();

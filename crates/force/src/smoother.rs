@@ -34,7 +34,8 @@ pub(crate) struct Passage {
     gain: Vec<f64>,
     /// Innovation and its variance.
     innovation: Vec<(f64, f64)>,
-    /// Last sample that has a separate covariance and gains; later ones have converged.
+    /// Last sample with its own covariance and gains. At later samples these values have converged,
+    /// so they are not stored.
     last: usize,
 }
 

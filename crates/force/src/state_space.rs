@@ -90,7 +90,8 @@ impl Machine {
         let (channels, forces) = self.through.shape();
         let ramp = &self.transition.ramp * &self.input;
         let fall = (&self.transition.held - &self.transition.ramp) * &self.input;
-        // The rising flank of an impulse at sample 0 is before the record.
+        // The force is linear between the samples, so an impulse is a triangle. If it is at sample
+        // 0, its rising side is before the record.
         let (mut first, mut inner) = (fall.clone(), &self.transition.state * &ramp + &fall);
         let mut matrix = DMatrix::zeros(channels * samples, forces * samples);
         let mut set_block = |lag: usize, first: &DMatrix<f64>, inner: &DMatrix<f64>| {

@@ -90,7 +90,8 @@ pub(crate) struct Transfer<'a> {
 }
 
 impl Transfer<'_> {
-    /// Returns measured channels × forces, each row divided by the scale of its channel.
+    /// Returns the transfer matrix at a line, measured channels × forces; each row is divided by
+    /// the scale of its channel.
     pub fn scaled(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
         let mut response = self
             .system

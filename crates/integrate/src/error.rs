@@ -168,7 +168,8 @@ pub enum IntegrateError {
         /// The frequency given, in rad/s.
         omega: f64,
     },
-    /// Fewer modes than wanted converged to rounding accuracy.
+    /// The number of modes that converged to rounding accuracy is smaller than the number
+    /// requested.
     #[error(
         "only {found} of {} converged in a space of {vectors} vectors: ask for fewer modes, or for modes near \
          another frequency",
@@ -202,7 +203,7 @@ pub enum IntegrateError {
         scheme: String,
         /// The step asked for, in seconds.
         dt: f64,
-        /// Spectral radius of the amplification matrix at that step.
+        /// Spectral radius of the amplification matrix at the requested step.
         spectral_radius: f64,
         /// Largest stable step in seconds, if there is one.
         critical_step: Option<f64>,

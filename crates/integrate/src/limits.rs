@@ -42,16 +42,17 @@ pub(crate) const CONDITION_STEPS: usize = 4;
 /// matrices of fixed size.
 pub(crate) const FIXED_SIZE_DOF: usize = 2;
 
-/// Maximum number of secant steps for a nonlinear force in a step of fixed size. If they do not
-/// suffice, Newton's method, which has safeguards, takes the step.
+/// Maximum number of secant steps for a nonlinear force in a time step that is computed with
+/// matrices of fixed size. If they do not suffice, Newton's method, which has safeguards, computes
+/// the time step.
 pub(crate) const SECANT_STEPS: usize = 12;
 
 /// Residual, in multiples of the tolerance, above which a secant step updates the slope; below it
 /// the residual is mostly rounding.
 pub(crate) const SECANT_UPDATE: f64 = 1e3;
 
-/// Number of steps that the general stepper takes after the equation of a step of fixed size was
-/// not solved; then steps of fixed size are tried again.
+/// Number of time steps that the general stepper takes after the method with matrices of fixed size
+/// did not solve the equation of a time step; then that method is tried again.
 pub(crate) const GENERAL_STEPS: usize = 16;
 
 /// Number of computed values between two log messages about the progress.
@@ -86,7 +87,7 @@ pub(crate) const PERIOD_MAP_DOF: usize = 300;
 /// accepted: a tenth of the documented accuracy.
 pub(crate) const PERIODIC_GAP: f64 = 1e-13;
 
-/// Relative residual of the equations of a linear periodic state in a Krylov space.
+/// Relative residual at which a Krylov search for a linear periodic state ends.
 pub(crate) const PERIODIC_GMRES_RESIDUAL: f64 = 1e-9;
 
 /// Maximum number of Krylov searches; each one reduces the residual of the previous one.
@@ -97,7 +98,8 @@ pub(crate) const PERIODIC_SEARCHES: usize = 8;
 /// correction of the state.
 pub(crate) const PERIODIC_PASSES: usize = 4;
 
-/// Ratio of successive corrections above which the remaining gap is rounding.
+/// Ratio of a correction of a linear periodic state to the previous correction; above it the
+/// remaining error is rounding, and the iteration ends.
 pub(crate) const PERIODIC_PROGRESS: f64 = 0.1;
 
 /// Change of the state, relative to the largest displacement, velocity or acceleration, for a
@@ -143,13 +145,14 @@ pub(crate) const MULTIPLIER_RESIDUAL: f64 = 1e-6;
 /// Maximum number of vectors of the search for the largest Floquet multiplier.
 pub(crate) const MULTIPLIER_VECTORS: usize = 200;
 
-/// Number of vectors between two evaluations of the largest multiplier.
+/// Number of vectors added to the Krylov space between two evaluations of the largest Floquet
+/// multiplier.
 pub(crate) const MULTIPLIER_CHECK_INTERVAL: usize = 10;
 
 // Stability.
 
-/// Maximum number of degrees of freedom for which the step limit comes from the whole
-/// amplification matrix; above it the fastest motions decide.
+/// Maximum number of degrees of freedom for which the largest stable step comes from the whole
+/// amplification matrix; above it, only the fastest motions of the system are examined.
 pub(crate) const AMPLIFICATION_DOF: usize = 20;
 
 /// Maximum number of degrees of freedom for which all eigenvalues of a dense matrix are computed;
@@ -161,14 +164,14 @@ pub(crate) const DENSE_EIGENVALUE_DOF: usize = 200;
 /// a million steps to grow by a factor e.
 pub(crate) const TOLERATED_GROWTH: f64 = 1e-6;
 
-/// Growth per step above which a step is larger than the critical step, unless the system has a
-/// free body. The rounding of two eigenvalues that almost coincide at the critical step is far
-/// smaller.
+/// Growth per step above which a step counts as larger than the critical step. The rounding error
+/// of two eigenvalues that almost coincide at the critical step is far smaller than this growth.
+/// For a system with a free body, [`TOLERATED_GROWTH`] is used instead.
 pub(crate) const CRITICAL_GROWTH: f64 = 1e-9;
 
-/// Factor on the limit of a scheme. An eigenvalue that is not proved to be below the limit is
-/// assumed to be at the limit times this factor. The motion of this eigenvalue then grows by more
-/// than [`TOLERATED_GROWTH`].
+/// Factor on the stability limit of a scheme for the eigenvalues of M⁻¹K or M⁻¹C. An eigenvalue
+/// that is not proved to be below the limit is assumed to be the limit times this factor. The
+/// motion of this eigenvalue then grows by more than [`TOLERATED_GROWTH`] per step.
 pub(crate) const EXCEEDED_LIMIT: f64 = 1.0 + 1e-8;
 
 /// Largest relative difference of two mirrored entries of a matrix that counts as symmetric.
@@ -189,7 +192,8 @@ pub(crate) const ENCLOSURE_WIDTH: f64 = 1e-4;
 /// twice the previous one.
 pub(crate) const ENCLOSURE_STEP: f64 = 0.01;
 
-/// Maximum number of factorisations for each end of the enclosure.
+/// Maximum number of factorisations that raise the upper bound of the highest eigenvalue, and of
+/// factorisations that then narrow its enclosure.
 pub(crate) const ENCLOSURE_FACTORISATIONS: usize = 64;
 
 /// Number of Arnoldi steps that estimate the eigenvalue of largest modulus.
@@ -198,7 +202,8 @@ pub(crate) const ARNOLDI_STEPS: usize = 32;
 /// Maximum number of vectors of the search for the fastest growing free motion.
 pub(crate) const GROWTH_VECTORS: usize = 40;
 
-/// Number of vectors between two evaluations of the growth.
+/// Number of vectors added to the Krylov space between two evaluations of the growth of the fastest
+/// growing free motion.
 pub(crate) const GROWTH_CHECK_INTERVAL: usize = 5;
 
 /// Largest excess of a growth factor over 1 that counts as rounding, for example of the double
@@ -209,11 +214,12 @@ pub(crate) const GROWTH_ROUNDING: f64 = 1e-4;
 /// a normal floating-point number.
 pub(crate) const VANISHED_MOTION: f64 = 1e-150;
 
-/// Number of periods over which a motion is followed if the search leaves its growth undecided.
+/// Number of periods over which a motion is simulated if the Krylov search could not decide whether
+/// the motion grows.
 pub(crate) const FOLLOWED_PERIODS: usize = 20;
 
-/// Ratio of the energy in the second half of the followed periods to that in the first half; above
-/// it the motion grows.
+/// Ratio of the energy of a motion in the second half of the [`FOLLOWED_PERIODS`] to its energy in
+/// the first half; above this ratio the motion counts as growing.
 pub(crate) const FOLLOWED_GROWTH: f64 = 2.0;
 
 // Modes of sparse systems.

@@ -145,7 +145,8 @@ pub(crate) struct Column {
     pub overriding: Option<Override>,
 }
 
-/// Unit or factor that a user states for a column; it has priority over the column's name.
+/// Unit or factor that a user states for a column; it has priority over a unit in the column's
+/// name.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Override {
     /// Unit of the numbers.
@@ -273,7 +274,7 @@ impl Lines {
         self.runs.clear();
     }
 
-    /// Appends the line numbers of the samples that follow the first `samples`.
+    /// Appends the line numbers in `other`, whose sample 0 is sample number `samples` of `self`.
     pub fn append(&mut self, samples: usize, other: &Self) {
         other.runs.iter().for_each(|(first, line)| self.push(samples + first, *line));
     }

@@ -69,7 +69,8 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     }
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
     let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);
-    // A parameter without a variance has no covariances either, so its row is reported once.
+    // A parameter without a variance has no covariances either, so that the rows of all other
+    // parameters have gaps, too. Only the parameters without a variance are then reported.
     let without_variance = |row: &usize| matrix[*row][*row].is_none();
     let rows = if (0..n).any(|row| without_variance(&row)) {
         (0..n).filter(without_variance).collect::<Vec<_>>()

@@ -65,8 +65,8 @@ fn parse_details(head: &str) -> Vec<(String, String)> {
     if lines.first().is_some_and(|line| line.trim() == "-1") {
         return first_of_each_name(universal_details(&lines));
     }
-    // In a LabVIEW header, name and value are separate fields; in other files such a line is a row
-    // of names.
+    // In a LabVIEW header, name and value are separate fields; in other files, a line of separate
+    // fields is a row of column names.
     let is_labview = lines.first().is_some_and(|line| line.starts_with("LabVIEW Measurement"));
     let signs: &[char] = if is_labview { &['\t', ',', ';'] } else { &[':', '='] };
     let above_table = lines.iter().take_while(|line| !begins_table(line));
@@ -84,7 +84,8 @@ fn begins_table(line: &str) -> bool {
     fields.next().is_some_and(is_number) && fields.all(is_number)
 }
 
-/// Returns the descriptions of the first dataset of each kind.
+/// Returns the details that the datasets 58 and 151 of a universal file state, in the order of the
+/// file.
 fn universal_details<'a>(lines: &'a [&str]) -> impl Iterator<Item = (String, String)> + 'a {
     let sets = lines.windows(2).enumerate().filter(|(_, pair)| pair[0].trim() == "-1");
     sets.flat_map(|(at, pair)| {

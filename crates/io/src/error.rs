@@ -118,7 +118,8 @@ pub enum IoError {
     SimulationMemory {
         /// The description.
         file: String,
-        /// Number of samples, times the number of degrees of freedom of the record.
+        /// Number of samples per period, times the number of periods, times the larger of the
+        /// numbers of forced and of recorded degrees of freedom.
         numbers: usize,
         /// Estimate of the required memory, in units of GB.
         needed_gb: f64,
@@ -287,7 +288,7 @@ pub enum IoError {
         /// The factor given.
         factor: f64,
     },
-    /// A column has two units, two factors, or both.
+    /// Two units, two factors, or a unit and a factor were set for one column.
     #[error("{}", Message(format_args!("two units or scales were set for column {column}: set only one, a `unit` or a \
         `scale` (the factor to SI units)")))]
     TwoUnits {
@@ -465,7 +466,7 @@ pub enum IoError {
     #[error("{}", Message(format_args!("\"{lines}\" is not a choice of lines: write all, odd, even, or numbers and ranges such as \
          1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
-        /// Text of the choice of lines.
+        /// Selection of lines, as the user wrote it.
         lines: String,
     },
     /// A text has no columns of frequency responses.
@@ -488,7 +489,7 @@ pub enum IoError {
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
          frequency of a period of {}", message::count(*len, "sample"))))]
     LineOutside {
-        /// Text of the choice of lines.
+        /// Selection of lines, as the user wrote it.
         lines: String,
         /// Line that does not exist.
         line: usize,

@@ -80,8 +80,8 @@ fn shortened(error: serde_json::Error) -> serde_json::Error {
     serde_json::Error::custom(format!("{beginning} … {end}"))
 }
 
-/// Reads a word: one of the variants of an enum. The derived reader would refuse other values with
-/// terms of the serialisation library, such as "expected unit".
+/// Reads a word: one of the variants of an enum. For a value that is not a text, the derived reader
+/// would report terms of the serialisation library, such as "expected unit".
 pub(crate) fn word<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<T, D::Error> {

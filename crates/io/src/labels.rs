@@ -9,7 +9,8 @@ use crate::table::is_time;
 /// case, letters only.
 const UNITS: [&str; 2] = ["eu", "uom"];
 
-/// Parts of names in which `unit` means the unit of an axis, or a device.
+/// Sequences of letters in names whose `unit` is not the unit of the values, but the unit of an
+/// axis (`xunit`) or a device (`serial`).
 const OTHER_UNITS: [&str; 10] =
     ["xunit", "unitx", "xaxis", "time", "number", "serial", "name", "count", "test", "under"];
 
@@ -33,7 +34,7 @@ pub(crate) fn states_unit(name: &str) -> bool {
 }
 
 /// Assigns the units of a list to the channels of a neighbouring array, if the array has as many
-/// channels as the list has units. A list without such an array becomes a remark.
+/// channels as the list has units. A list without such an array is reported in a remark.
 fn with_listed_units(mut contents: Contents) -> Contents {
     let mut lists: Vec<(String, Vec<String>)> = Vec::new();
     for (path, text) in &contents.texts {
@@ -66,7 +67,7 @@ fn with_listed_units(mut contents: Contents) -> Contents {
         for (column, channel) in contents.columns.iter_mut().zip(&channels) {
             let Some((array, channel)) = channel else { continue };
             let is_whole = counts.get(array.as_str()) == Some(&units.len());
-            // The number in a name may be larger than the number of units.
+            // The channel number in the name of a column may be larger than the number of units.
             let unit = units.get(*channel).filter(|_| is_whole && column.unit.is_empty());
             if let Some(unit) = unit {
                 (column.unit, is_used) = (unit.clone(), true);
@@ -89,7 +90,7 @@ pub(crate) fn with_labels(contents: Contents) -> Contents {
     let mut contents = with_listed_units(contents);
     let mut labels: HashMap<&str, [&str; 2]> = HashMap::new();
     for (path, text) in &contents.texts {
-        // An element of a list belongs to one channel, not to the whole struct.
+        // A text in a list, such as `units{1}`, belongs to one channel, not to the whole struct.
         let Some((place, leaf)) = path.rsplit_once('.').filter(|_| !path.ends_with('}')) else {
             continue;
         };
@@ -151,7 +152,7 @@ mod tests {
     }
 
     /// Units in a cell array are assigned to the columns of the matrix in the same struct; a cell
-    /// array that fits no matrix becomes a remark.
+    /// array that fits no matrix is reported in a remark.
     #[test]
     fn a_list_of_units_belongs_to_the_matrix_beside_it() {
         let column = |name: &str| Column::from_numbers(name.into(), vec![1.0, 2.0]);

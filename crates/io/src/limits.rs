@@ -49,9 +49,9 @@ pub struct ReadOptions {
 
 /// Limits that damaged and forged files exceed, and measured records do not.
 ///
-/// A few hundred bytes can expand to gigabytes, in a compressed variable or after a quote that is
-/// never closed. Reading stops with [`IoError::TooLarge`](crate::IoError::TooLarge) before the
-/// memory is allocated.
+/// A compressed variable of a few hundred bytes can expand to gigabytes, and a quote that is never
+/// closed makes all following text one row. Reading stops with
+/// [`IoError::TooLarge`](crate::IoError::TooLarge) before the memory is allocated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Maximum number of bytes of a row of text, including quoted line breaks; 4 MiB by default.
@@ -75,8 +75,8 @@ pub struct Limits {
     /// 256 MiB by default.
     pub memory_bytes: usize,
     /// Additional memory for each byte of the file, in bytes; 512 by default. Each number of a
-    /// measured record takes at least one byte of the file, so a file with more numbers than bytes
-    /// is not a measured record.
+    /// measured record takes at least one byte of the file, so this memory is available for each
+    /// number. A file with more numbers than bytes is not a measured record.
     pub memory_per_byte: usize,
     /// Maximum memory that a file may use, in bytes, even if `memory_per_byte` would allow more; 8
     /// GiB by default.

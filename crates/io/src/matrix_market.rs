@@ -16,8 +16,8 @@ use crate::contents::Place;
 use crate::table::source::{Source, failed};
 use crate::{IoError, Limit, Limits};
 
-/// Memory per row, in numbers of [`Limits::numbers`]: a row without entries needs memory, too. By
-/// default a matrix has at most 2²² rows.
+/// Share of [`Limits::numbers`] that each row uses, because a row without entries needs memory,
+/// too. By default, a matrix can therefore have at most 2²² rows.
 pub(crate) const NUMBERS_PER_ROW: usize = 64;
 
 /// Relation between the stored triangle of a matrix and the triangle that is not stored.
@@ -169,7 +169,7 @@ impl Header {
         };
         if !matches!(field, "real" | "double" | "integer") {
             return Err(lines.malformed(
-                "only matrices with real, double or integer entries can be read (third word of the first line)",
+                "only matrices with real, double or integer entries can be read (fourth word of the first line)",
             ));
         }
         let symmetry = match symmetry {
@@ -272,7 +272,7 @@ impl Lines {
         let mut words = self.words();
         match (words.next(), words.next()) {
             (Some(value), None) => self.number(value),
-            _ => Err(self.malformed("in the format array, a line has one number")),
+            _ => Err(self.malformed("in the array format, each line has one number")),
         }
     }
 

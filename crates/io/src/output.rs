@@ -80,7 +80,8 @@ static TEMPORARIES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 ///
 /// # Errors
 /// [`IoError::Write`] naming the file, also for two files with one destination; the files at the
-/// destinations are then unchanged, unless standard output alone was closed.
+/// destinations are then unchanged. If only standard output fails, because its reader has closed
+/// it, all other files are already written.
 pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoError> {
     let mut staged_files = begun;
     for file in files {
@@ -246,8 +247,9 @@ fn resolved(path: &Path) -> io::Result<PathBuf> {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // The target of this link does not exist yet. A link to a pipe is not followed here:
-        // `metadata` finds the pipe, and the text of such a link is not a path.
+        // A link whose target does not exist yet is followed by its text. A link to an open pipe,
+        // such as `/dev/fd/3`, is not followed: `metadata` finds the pipe, and the text of such a
+        // link is not a path.
         if fs::metadata(&path).is_err()
             && let Ok(target) = fs::read_link(&path)
         {

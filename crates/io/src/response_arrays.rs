@@ -49,9 +49,10 @@ pub(crate) fn add_functions(
     }
     if !others.is_empty() {
         let names: Vec<_> = others.iter().map(|array| escaped(&array.name)).collect();
-        responses
-            .remarks
-            .push(format!("left out: {} (no dimension is frequency)", names.join(", ")));
+        responses.remarks.push(format!(
+            "left out: {} (no dimension has the length of the frequency vector)",
+            names.join(", ")
+        ));
     }
     add_coherence(table, responses);
     Ok(())
@@ -187,9 +188,10 @@ impl Header {
     }
 }
 
-/// Returns the last part of the name of an array, in a struct or a group.
+/// Returns the name of an array without the names of the structs or groups that contain it.
 fn leaf(name: &str) -> &str {
-    // A slash in the unit in brackets at the end does not separate groups.
+    // A slash in a unit in brackets at the end of the name, such as `[m/N]`, does not separate
+    // groups.
     let open = [(']', '['), (')', '(')].into_iter().find(|(close, _)| name.ends_with(*close));
     let end = open.and_then(|(_, open)| name.rfind(open)).unwrap_or(name.len());
     let start = name[..end].rfind(['.', '/']).map_or(0, |at| at + 1);
@@ -240,7 +242,8 @@ impl Shape {
         let one = Dimension { len: 1, stride: 0 };
         let points = match point_dimensions[..] {
             [] => [one, one],
-            // A vector is a matrix of one row or one column.
+            // This dimension has the points of the response. For a vector it has length 1: MATLAB
+            // stores a vector as a matrix of one row or one column.
             [points] => [points, one],
             [points, references] => [points, references],
             _ => {

@@ -134,9 +134,9 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     }
     if negative + mirrored > 0 {
         let count = negative + mirrored;
-        responses
-            .remarks
-            .push(format!("left out: {count} mirrored values, of negative frequencies"));
+        responses.remarks.push(format!(
+            "left out: {count} mirrored frequencies, negative or above half the sampling rate"
+        ));
     }
     let pick = |values: &[f64]| order.iter().map(|at| values[*at]).collect::<Vec<f64>>();
     for function in &mut responses.functions {
@@ -156,7 +156,8 @@ fn mirrored(responses: &FrequencyResponses, order: &[usize]) -> usize {
     /// Maximum relative difference between a value and its mirror image, from the rounding of
     /// printed numbers.
     const SAME: f64 = 1e-6;
-    /// Minimum number of lines above 0 Hz.
+    /// Minimum number of lines above 0 Hz in a spectrum that is searched for a mirrored half; in a
+    /// spectrum with fewer lines, no line counts as mirrored.
     const MIN_LINES: usize = 3;
     let hz = |at: usize| responses.frequency_hz[at];
     let lines = order.iter().copied().filter(|at| hz(*at) > 0.0).collect::<Vec<_>>();

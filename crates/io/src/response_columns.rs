@@ -190,7 +190,8 @@ fn level(note: &str) -> Option<&str> {
     Some(inner.unwrap_or(reference))
 }
 
-/// Splits a name without brackets at a level with a reference: `H11 dB re 1 g/N`.
+/// Splits off a level in dB with its reference from a name without brackets: `H11 dB re 1 g/N`
+/// gives `H11` and `dB re 1 g/N`.
 fn without_level(name: &str) -> (&str, Option<String>) {
     let lower = name.to_ascii_lowercase();
     let starts_word = |at: &usize| !name[..*at].ends_with(char::is_alphanumeric);
@@ -372,7 +373,8 @@ fn function<'a>(
     Ok(ResponseFunction { response, reference, quantity: first.quantity, values, standard_error })
 }
 
-/// Reads a response with this magnitude, perhaps in dB, and the phase in another column.
+/// Reads a response from its `magnitude`, which may be a level in dB, and from its phase in another
+/// column.
 fn polar<'a>(
     table: &Table,
     first: &Heading,
@@ -426,7 +428,7 @@ fn missing(table: &Table, heading: &Heading, what: &str) -> IoError {
     }
 }
 
-/// Returns the error of a level in dB without a phase.
+/// Returns the error for a column with a level in dB, if there is no column with the phase.
 fn without_phase(table: &Table, heading: &Heading) -> IoError {
     let column = table.label(heading.column);
     let reference = match &heading.unit {

@@ -296,7 +296,8 @@ pub const DERIVATIVE: &str = "time_derivative";
 /// Name of the column with the decay that an exponential window adds to every mode, in 1/s.
 pub const ADDED_DECAY: &str = "added_decay";
 
-/// Returns the order of the time derivative of the displacement, a pure number from 0 to 2.
+/// Returns the order of the time derivative of the displacement that gives this quantity, a pure
+/// number: 0 for the displacement, 1 for the velocity, 2 for the acceleration.
 pub fn derivative(quantity: ResponseQuantity) -> f64 {
     match quantity {
         ResponseQuantity::Displacement => 0.0,

@@ -3,7 +3,7 @@
 use crate::contents::{Axis, Contents};
 use crate::table::is_time;
 
-/// Names of a sample rate in Hz, in lower case and without `_`.
+/// Lower-case names, without `_`, of a number that is a sample rate in Hz.
 const RATES: [&str; 14] = [
     "fs",
     "fshz",
@@ -21,7 +21,7 @@ const RATES: [&str; 14] = [
     "samplefreq",
 ];
 
-/// Names of a time step in s, in lower case and without `_`.
+/// Lower-case names, without `_`, of a number that is a time step in s.
 const STEPS: [&str; 13] = [
     "dt",
     "dts",
@@ -41,8 +41,8 @@ const STEPS: [&str; 13] = [
 /// Maximum relative difference between two steps that count as equal.
 const SAME_STEP: f64 = 1e-5;
 
-/// Assigns to every column the rate that is stated in its struct or group, or in one that contains
-/// it.
+/// Assigns to every column the rate that its struct or group states. If this struct or group states
+/// none, the nearest struct or group around it is used.
 pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     let stated: Vec<(usize, &str, f64)> = (0..)
         .zip(&contents.scalars)
@@ -70,9 +70,9 @@ pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     contents
 }
 
-/// Assigns to each column the instants of the time column in the same struct or group, or at the
-/// top level for columns there. It does so only for files in which a struct or a group has a time
-/// column.
+/// Assigns to each column the instants of the time column that is in the same struct or group and
+/// has the same number of samples; the top level is also a group. It does so only for files in
+/// which a struct or a group has a time column.
 pub(crate) fn with_own_times(mut contents: Contents) -> Contents {
     let group = |at: usize| enclosing(&contents.columns[at].name);
     let times: Vec<usize> = (0..contents.columns.len())

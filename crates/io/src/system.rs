@@ -144,8 +144,9 @@ struct ChannelDescription {
 }
 
 impl NonlinearDescription {
-    /// Returns the delay of the force channel, in s, and the cubic and quintic term of the phase
-    /// that all channels add, in rad; zero if the file has none.
+    /// Returns the delay of the force channel, in s, and the coefficients, in rad, of the cubic and
+    /// the quintic term in frequency of the phase that all channels add. A number that the file
+    /// does not state is zero.
     pub fn channels(&self) -> [f64; 3] {
         let ChannelDescription { delay, cubic, quintic } = self.channels;
         [delay, cubic, quintic]
@@ -185,7 +186,7 @@ pub(crate) struct LoadedSystem {
     pub(crate) sparse: Option<SparseSystem>,
     /// Nonlinear terms of the file with the system.
     pub(crate) nonlinear: Option<NonlinearDescription>,
-    /// Paths of the files.
+    /// Paths of the files that were read.
     pub(crate) files: Vec<PathBuf>,
 }
 
@@ -328,7 +329,7 @@ impl SystemDescription {
     }
 
     /// Returns whether only a few entries of the full matrices of a large machine are not zero, so
-    /// that steps with sparse matrices take less time.
+    /// that time steps are faster with sparse matrices.
     fn is_mostly_zero(&self) -> bool {
         let few = |entries: &Entries| match entries {
             Entries::Rows(rows) => {

@@ -1,6 +1,6 @@
 //! The memory that the estimators need does not grow with the length of a text file.
 //!
-//! The counter covers the whole program; therefore this file has one test.
+//! The counter of allocated bytes covers the whole program. Therefore this file has only one test.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -110,8 +110,9 @@ fn memory_does_not_grow_with_the_record() {
     });
     // Five columns of the long record are 8 MB.
     assert!(long < 2_000_000, "{long} bytes");
-    // The record is twenty times as long. Only the width of the printed numbers may grow, and the
-    // number of blocks that the threads read and parse at the same time.
+    // The long record has twenty times as many rows as the short one. It may need slightly more
+    // memory only because its printed instants have more digits, and because the threads may read
+    // and parse more blocks at the same time.
     assert!(
         long < short + short / 20 + 2 * BLOCK,
         "{short} bytes for the short record, {long} for the long one"

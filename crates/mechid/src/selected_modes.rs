@@ -36,7 +36,7 @@ pub struct SelectedMode {
     pub damped_frequency_hz: f64,
     /// Damping ratio, a pure number; negative if unstable, ±1 for a real eigenvalue.
     pub damping_ratio: f64,
-    /// Real and imaginary part, in rad/s.
+    /// Real and imaginary part of the eigenvalue, in rad/s.
     pub eigenvalue: [f64; 2],
     /// ‖(λ²M + λC + K) φ‖ relative to the size of its terms (pure number).
     pub residual: f64,

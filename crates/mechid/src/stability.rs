@@ -66,8 +66,8 @@ pub struct SchemeAccuracy {
     pub machine: Option<MachineStability>,
 }
 
-/// Accuracy of a step of one length for a free oscillation; `None` if the numerical response does
-/// not oscillate.
+/// Accuracy of a scheme with one step length for a free oscillation. A field is `None` if the
+/// numerical response does not oscillate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepAccuracy {
     /// Step as a fraction of the undamped period.
@@ -184,7 +184,7 @@ impl fmt::Display for SchemeComparison {
             ("Amplitude decay per period (%)", |p| p.stable(p.amplitude_decay).map(|d| 100.0 * d)),
             ("Numerical damping ratio", |p| p.stable(p.numerical_damping_ratio)),
         ];
-        f.write_str("– where the motion grows or does not oscillate\n\n")?;
+        f.write_str("–: the motion grows or does not oscillate\n\n")?;
         for (title, value) in tables {
             writeln!(f, "{title}\n{}", self.table(value))?;
         }

@@ -22,8 +22,8 @@ fn error(scheme: &str, samples: usize) -> f64 {
     (found - truth).amax() / truth.amax()
 }
 
-/// Reference: F in ẍ + 2 ẋ + x + x³ = F is chosen for x = cos 2t; the damping is so large that no
-/// other periodic response exists.
+/// Reference: for the force F of this test, x = cos 2t is a solution of ẍ + 2 ẋ + x + x³ = F. The
+/// damping is so large that no other periodic response exists.
 #[test]
 fn a_nonlinear_machine_goes_round_its_orbit() {
     let simulated = |scheme: &str, response: &str| {
@@ -82,7 +82,8 @@ fn an_orbit_that_no_machine_stays_on_is_refused() {
     let SimulateError::UnstableOrbit { multiplier } = refused else { panic!("{refused}") };
     assert!((multiplier - std::f64::consts::E).norm() < 1e-6, "{multiplier}");
     assert!(refused.to_string().contains("a disturbance by 2.7183 "), "{refused}");
-    // The roots of λ² + 1.5 λ + 1 = 0 have modulus 1 and real part −3/4; the period is 2 s.
+    // The roots of λ² + 1.5 λ + 1 = 0 have the real part −3/4. A period of 2 s therefore multiplies
+    // a disturbance by e^(−1.5).
     let stable = simulated(1.0).unwrap();
     let Multiplier { value, error, scheme_error } = stable.multiplier.unwrap();
     let missed = (value.norm() - (-1.5_f64).exp()).abs();

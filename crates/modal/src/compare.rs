@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::indicators::{Indicator, IndicatorError, ShapeWithCovariance, mac, mac_with_error};
 
-/// Largest ratio of the frequencies of two modes that may represent the same mode. Before an
-/// update, the frequencies of a finite-element model may differ from the measured ones by up to a
+/// Largest ratio of the frequencies of two modes that may represent the same mode. Before model
+/// updating, the frequencies of a finite-element model may differ from the measured ones by up to a
 /// fifth.
 const MAX_FREQUENCY_RATIO: f64 = 1.25;
 

@@ -122,8 +122,8 @@ impl ModalConstraint {
                 let pole = mode.pole();
                 let phase = pole.powi(*derivative) / Complex::i();
                 let phase = phase / phase.norm();
-                // If the gauge is a transient, it does not fix the phase of the forces;
-                // `phase_input` does.
+                // The gauge is the input or transient whose participation is fixed at 1. If it is a
+                // transient, it does not fix the phase of the forces; the input `phase_input` does.
                 let reference = mode.phase_input();
                 let phase_factor = mode.participation(reference);
                 let phase_factor = phase_factor / phase_factor.norm();
@@ -198,7 +198,7 @@ pub(crate) fn impose(
     statistic.is_finite().then_some((statistic, count, mode))
 }
 
-/// Tests each constraint alone on one mode.
+/// Tests each constraint on one mode without the other constraints.
 pub(crate) fn test(
     constraints: &[ModalConstraint],
     estimate: &ModeParameters,
@@ -294,8 +294,9 @@ mod tests {
         assert!((plain.shape(0) - result.shape(0)).norm() < 1e-12);
     }
 
-    /// If the pole is known, each shape entry loses its component perpendicular to the phase of a
-    /// real residue, which is λ²/j for accelerations per force.
+    /// The test imposes real shapes on a mode with a known pole. Each shape entry loses its
+    /// component perpendicular to the phase of the residues, which is the phase of λ²/j for
+    /// accelerations per force.
     #[test]
     fn real_shapes_lose_their_part_across_the_phase() {
         let pole = C::new(-2.0, 300.0);

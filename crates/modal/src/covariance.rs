@@ -63,8 +63,8 @@ impl Covariance {
         let scale = parameter_scale(&pairs, model);
         let shapes = whitened_shapes(projection, modes);
         let (unknowns_by_parameter, rows) = unknowns_by_parameter(lines, model, projection, &pairs);
-        // The weights include the responses to unmeasured forces, which are far above the sensor
-        // noise near a resonance.
+        // The sensor noise replaces the weights of the fit here: the weights include the responses
+        // to unmeasured forces, which are far above the sensor noise near a resonance.
         let mean = mean_sensor(fit, noise);
         let weights = mean.iter().zip(&fit.weights.spectrum_shape);
         let deviation: Vec<f64> = weights.map(|(mean, shape)| mean.sqrt() / shape).collect();
@@ -185,9 +185,10 @@ impl Covariance {
     /// Returns the parameters of some modes with given shapes, mode after mode, and their joint
     /// covariance.
     ///
-    /// To first order the error of entry i of a shape is A⁺ times the noise of output i minus B_i
-    /// dθ; an unmeasured force on a mode multiplies all entries of the shape of this mode by the
-    /// same complex factor.
+    /// To first order the error of entry i of a shape is A⁺ times the noise of output i, minus B_i
+    /// dθ. Here A⁺ is the pseudoinverse of the columns of the linear unknowns x_i of output i, B_i
+    /// is A⁺ ∂A/∂θ x_i, and dθ is the error of the parameters of the search. An unmeasured force on
+    /// a mode multiplies all entries of the shape of this mode by the same complex factor.
     pub(crate) fn joint(
         &self,
         fit: &Fit<'_>,
@@ -290,7 +291,8 @@ fn rotation(z: C) -> DMatrix<f64> {
     DMatrix::from_row_slice(2, 2, &[z.re, -z.im, z.im, z.re])
 }
 
-/// Returns A⁺C (for all columns of A), and the rows of (AᵀA)⁻¹ that belong to modes, as columns.
+/// Returns A⁺C, the derivatives of all linear unknowns (the columns of A) with respect to the
+/// parameters, and the rows of (AᵀA)⁻¹ that belong to modes. These rows are stored as columns.
 fn unknowns_by_parameter(
     lines: &Lines,
     model: &Model,
@@ -360,8 +362,8 @@ fn sensor_variance(
     (score_variance, unknowns)
 }
 
-/// Returns, for every line, the mean over the outputs of the ratio of the sensor noise variance to
-/// the squared level of the output in the weights.
+/// Returns, for every line, the variance of the sensor noise divided by the squared level of the
+/// output in the weights; this ratio is averaged over the outputs.
 fn mean_sensor(fit: &Fit<'_>, noise: &Noise) -> Vec<f64> {
     let levels = &fit.weights.level;
     let mut mean = vec![0.0; fit.lines.len()];

@@ -35,13 +35,14 @@ impl OutputDelay {
     }
 }
 
-/// Returns the delays (s), one for each output, with which modes at `poles` (rad/s) and the first
-/// residual terms explain the outputs best. `None` if the delays improve the fit by less than the
-/// penalty of one unknown per output in Schwarz's criterion.
+/// Returns the delays (s), one for each output, for which a model of modes at `poles` (rad/s) and
+/// of the first residual terms explains the outputs best. `None` if the delays improve the fit by
+/// less than the penalty of one unknown per output in Schwarz's criterion.
 ///
-/// The first residual terms have even powers of jω, as undamped modes outside the band have. A
-/// delay needs odd powers. The residues are free. A grid of delays common to some outputs gives the
-/// initial estimate; Gauss–Newton steps of each output follow.
+/// The first residual terms have even powers of jω, like the response of undamped modes outside the
+/// band. They cannot represent a delay, because the effect of a delay has odd powers, too. The
+/// residues are free. A grid of delays common to some outputs gives the initial estimate;
+/// Gauss–Newton steps of each output follow.
 pub(crate) fn apparent_delays(lines: &Lines, poles: &[C]) -> Option<Vec<f64>> {
     if lines.inputs() == 0 || poles.is_empty() {
         return None;
@@ -149,8 +150,8 @@ impl<D: Design> Trial<'_, D> {
         self.residuals(self.advanced(delays)).iter().map(|residual| square(residual)).collect()
     }
 
-    /// Returns the best common delay (s), on a grid, of the outputs whose power the model explains
-    /// best.
+    /// Returns the delay (s) on a grid that, as a common delay, best fits the [`DELAY_OUTPUTS`]
+    /// outputs whose power the model without delays explains best.
     fn common_delay(&self) -> f64 {
         let costs = self.costs(&vec![0.0; self.lines.outputs.len()]);
         let unexplained = |output: &usize| {

@@ -97,7 +97,7 @@ pub(crate) fn gram(a: &[f64], rows: usize, product: &mut [f64]) {
     );
 }
 
-/// Adds `factor` AB to `sum`: A has `rows` rows and `inner` columns.
+/// Adds `factor` times AB to `sum`; A has `rows` rows and `inner` columns.
 pub(crate) fn add_product(
     sum: &mut [f64],
     a: &[f64],

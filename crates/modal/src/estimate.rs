@@ -398,7 +398,8 @@ fn residual_coefficients(fit: &Fit<'_>) -> Vec<Vec<Vec<f64>>> {
     (0..fit.lines.outputs.len()).map(of_output).collect()
 }
 
-/// Returns the ranges of modes, by rising frequency, whose errors are not independent.
+/// Returns ranges of neighbouring modes, by rising frequency. Only errors of modes in different
+/// ranges are treated as independent.
 fn neighbours(modes: &[ModeParameters]) -> Vec<Range<usize>> {
     let poles: Vec<C> = modes.iter().map(ModeParameters::pole).collect();
     let mut ranges: Vec<Range<usize>> = Vec::new();

@@ -195,8 +195,8 @@ impl<'a> Identification<'a> {
         search
     }
 
-    /// Returns the identification with the same model, weights and noise, for `lines`; other delays
-    /// were removed from the outputs of these lines.
+    /// Returns the identification with the same model, weights and noise for `lines`: the same
+    /// lines after the removal of other delays from the outputs.
     fn on<'b>(self, lines: &'b Lines) -> Identification<'b>
     where
         'a: 'b,
@@ -415,7 +415,7 @@ impl<'a> Identification<'a> {
             let loses = retained.iter().zip(&trial.model.poles).any(is_lost);
             let gain = trial.cost() - self.fit.cost();
             log::debug!(
-                "mode {:.3} Hz removed: cost +{:.0}, +{gain:.0} after {} steps; limit +{required:.0}",
+                "mode {:.3} Hz removed: cost +{:.0} at fixed poles, +{gain:.0} after {} steps; limit +{required:.0}",
                 self.fit.model.poles[mode].im / TAU,
                 losses[mode],
                 trial.steps - self.fit.steps,
@@ -439,7 +439,8 @@ impl<'a> Identification<'a> {
         -pole.re / pole.norm() <= MAX_DAMPING && self.lines.reaches(pole)
     }
 
-    /// Returns which modes were requested by frequency or number: no rule removes them.
+    /// Returns which modes the settings request, by frequency or by a number of modes; no rule
+    /// removes these modes.
     fn protected(&self) -> Vec<bool> {
         let ModalSettings { modes, near_hz, .. } = self.settings;
         match modes {
@@ -557,9 +558,9 @@ impl<'a> Identification<'a> {
         }
     }
 
-    /// Returns the covariance of the last fit; `None` if the curvature of the last mode is
-    /// singular. While the curvature is singular, the modes outside the band are removed; then the
-    /// mode that the data determine least is removed, one mode at a time.
+    /// Returns the covariance of the last fit. If the curvature of the fit is singular, the modes
+    /// outside the band are removed first, then one mode at a time: the mode that the data
+    /// determine least. `None` if the curvature is still singular with one mode.
     fn covariance_of_all(&mut self) -> Option<Covariance> {
         loop {
             let covariance = Covariance::new(&self.fit, &self.noise);

@@ -275,10 +275,10 @@ fn solve_ridged(mut matrix: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError
     }
 }
 
-/// Sums, over the lines, of the products of two channels times a power of z.
+/// Products of two channels and a power of z, summed over the lines.
 struct Lags {
     channels: usize,
-    /// `[lag][a + channels · b]`: Σ z^lag v_a v_b*.
+    /// Σ z^lag v_a v_b* over the lines, for the channels a and b: `[lag][a + channels · b]`.
     sums: Vec<Vec<C>>,
 }
 

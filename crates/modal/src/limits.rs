@@ -27,7 +27,7 @@ pub const ROUGH_STEPS: usize = 10;
 pub const LEAST_CURVATURE: f64 = 1e-2;
 /// Maximum change of the logarithm of a decay rate in one step of the search.
 pub const MAX_DECAY_STEP: f64 = 1.0;
-/// Largest relative step of a natural frequency, in damping ratios.
+/// Largest relative step of a natural frequency, as a multiple of the damping ratio of the mode.
 pub const MAX_FREQUENCY_STEP_DAMPINGS: f64 = 3.0;
 /// Relative step of a natural frequency that is always allowed, even for very small damping.
 pub const MIN_FREQUENCY_STEP: f64 = 2e-3;

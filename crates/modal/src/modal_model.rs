@@ -35,7 +35,7 @@ pub struct ModalModel {
     pub groups: Vec<ModalGroup>,
 }
 
-/// One mode of the sum.
+/// One mode of a modal model: its pole, shape and participations.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]

@@ -92,8 +92,9 @@ impl ModeParameters {
         }
     }
 
-    /// Returns the input that fixes the phase of the forces: the gauge, or the strongest input of a
-    /// mode whose gauge is a transient.
+    /// Returns the input that fixes the phase of the forces. This is the load whose participation
+    /// is 1 (the gauge); if the gauge is a transient, it is the input with the largest
+    /// participation.
     pub(crate) fn phase_input(&self) -> usize {
         if self.gauge < self.inputs {
             return self.gauge;

@@ -68,8 +68,9 @@ impl Noise {
     /// Returns the weights: a level of each output, and a spectral shape that all outputs share.
     ///
     /// The level of an output is the level of its sensor noise. The square of the common spectral
-    /// shape is the mean of the sensor noise powers, each divided by its squared level, times 1 +
-    /// Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r, the noise in the direction of the modes.
+    /// shape is a product of two factors. The first is the mean over the outputs of the sensor
+    /// noise power divided by the squared level. The second is 1 + Σ_r S_r |h_r|² φ_rᴴ D⁻¹ φ_r,
+    /// where the sum is the noise in the direction of the modes.
     pub(crate) fn weights(&self, lines: &Lines, model: &Model, shapes: &[Vec<C>]) -> Weights {
         let count = lines.len() as f64;
         let directions = self.directions(shapes);

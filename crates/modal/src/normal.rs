@@ -1,8 +1,9 @@
 //! Normal equations of poles and participations, with the linear unknowns projected out (Kaufman).
 //!
-//! All outputs share one pair of columns of C for each pair of parameters. The derivatives of
-//! output i are this pair multiplied by T_i, the 2 × 2 matrix of the shape φ_i. The matrix JᵀJ =
-//! Σ_i T_iᵀ (CᵀP⊥C) T_i therefore needs one product CᵀC for any number of outputs.
+//! All outputs share the matrix C, which has one pair of columns for each pair of parameters. The
+//! derivatives of output i are this pair multiplied by T_i, the 2 × 2 matrix of the shape φ_i. The
+//! matrix JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i, where P⊥ projects the linear unknowns out, therefore needs
+//! one product CᵀC for any number of outputs.
 //!
 //! # Source
 //! Kaufman, BIT 15 (1975) 49.
@@ -58,8 +59,8 @@ pub(crate) fn whitened_shapes(projection: &Projection, modes: usize) -> Vec<f64>
     shapes
 }
 
-/// Returns indices and pairs of the parameters that affect a block: all poles, and the
-/// participations of the loads of the block.
+/// Returns the pairs of parameters that affect a block, after their indices in the list of all
+/// pairs. These parameters are all poles, and the participations of the loads of the block.
 pub(crate) fn block_pairs(
     pairs: &[(usize, Option<usize>)],
     block: &Block,
@@ -126,8 +127,8 @@ pub(crate) fn parameter_scale(pairs: &[(usize, Option<usize>)], model: &Model) -
     pairs.iter().flat_map(scale).collect()
 }
 
-/// Sums, over the outputs, of the products of the shapes of two modes: real part times real part
-/// (xx), real part times imaginary part (xy), and so on.
+/// Products of the shapes of two modes, summed over the outputs: real part times real part (xx),
+/// real part times imaginary part (xy), and so on.
 pub(crate) struct ShapeProducts {
     modes: usize,
     sums: Vec<f64>,
@@ -140,7 +141,8 @@ impl ShapeProducts {
         Self { modes, sums: transposed_product(shapes, shapes, outputs.max(1)) }
     }
 
-    /// Returns xx, xy, yx, yy of two modes.
+    /// Returns the sums xx, xy, yx and yy of two modes; the first letter is a part of the shape of
+    /// mode `r` (x real, y imaginary), the second letter a part of the shape of mode `s`.
     fn pair(&self, r: usize, s: usize) -> [f64; 4] {
         let entry = |row: usize, column: usize| self.sums[column * 2 * self.modes + row];
         let (x, y, u, v) = (2 * r, 2 * r + 1, 2 * s, 2 * s + 1);
@@ -240,7 +242,8 @@ impl Lane {
         }
     }
 
-    /// Adds CᵀC and AᵀC of a block at the indices of its parameters and columns.
+    /// Adds the products CᵀC and AᵀC of a block to the sums over blocks, at the indices of its
+    /// parameters and columns; C has the derivatives, and A is the design matrix.
     fn add_products(&mut self, indices: &[usize], arrays: &BlockArrays, rows: usize) {
         let (count, size) = (2 * indices.len(), self.descent.len());
         self.local_gram.resize(count * count, 0.0);

@@ -33,8 +33,8 @@ pub(crate) struct Candidate {
     pub(crate) explained: f64,
 }
 
-/// Returns the required decrease of −2 log L by one more mode: the number of its parameters times
-/// the logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
+/// Returns the decrease of −2 log L that one more mode must achieve: the number of its parameters
+/// times the logarithm of the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
 pub(crate) fn required_gain(lines: &Lines) -> f64 {
     let parameters = 2 * (lines.outputs.len() + lines.loads.len() - 1) + 2;
     parameters as f64 * lines.schwarz()
@@ -93,7 +93,8 @@ pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
     candidates(fit, &|_| true)
 }
 
-/// Returns the candidates at some of the poles (rad/s) of the grid, the best first.
+/// Returns the candidates at the poles (rad/s) of the grid for which `is_tried` is true, the best
+/// first.
 fn candidates(fit: &Fit<'_>, is_tried: &dyn Fn(C) -> bool) -> Vec<Candidate> {
     let lines = fit.lines;
     let (low, high) = lines.band();
@@ -126,7 +127,7 @@ fn line_spacing(lines: &Lines) -> Option<f64> {
 
 /// Whitened residuals as complex rows.
 struct Residual {
-    /// `[line · outputs + output]`.
+    /// Residual of every output on every line: `[line · outputs + output]`.
     values: Vec<C>,
     /// Weight of every line.
     weight: Vec<f64>,
@@ -195,8 +196,9 @@ impl Residual {
     }
 }
 
-/// Returns the leading participations and the gain of the best rank-one coefficient of a
-/// least-squares problem with products `square` (loads × loads) and `cross` (loads × outputs).
+/// Solves a least-squares problem for a coefficient matrix of rank one, and returns the
+/// participations in this matrix and its gain. The products of the problem are `square` (loads ×
+/// loads) and `cross` (loads × outputs).
 fn rank_one(
     square: &mut [C],
     cross: &mut [C],

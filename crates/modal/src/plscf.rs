@@ -29,7 +29,7 @@ const MIN_SHARE: f64 = 0.4;
 /// power of this number.
 const MAX_COMPANION: usize = 400;
 
-/// Error of the estimator of frequency responses.
+/// Error of the pLSCF estimator, which estimates poles from frequency responses.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlscfError {
@@ -295,7 +295,7 @@ impl NormalEquations {
     }
 }
 
-/// Sums over the lines of one output.
+/// Products of numerator and denominator terms of one output, summed over the lines.
 struct OutputSums {
     /// L⁻¹ S, where L is the Cholesky factor of the sums of the numerator, and S contains the mixed
     /// sums of numerator and denominator. The leading rows and columns of L⁻¹ S belong to the lower

@@ -56,7 +56,7 @@ pub(crate) struct BlockArrays {
     pub(crate) outputs: Vec<f64>,
     /// Indices of the columns of the whole problem that act on the block.
     pub(crate) columns: Vec<usize>,
-    /// Whitened columns, 2n rows each for n lines.
+    /// Whitened columns of the design matrix, 2n rows each for n lines.
     pub(crate) design: Vec<f64>,
     /// Whitened residuals, 2n rows each for n lines.
     pub(crate) residual: Vec<f64>,

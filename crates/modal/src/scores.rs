@@ -34,8 +34,8 @@ pub(crate) struct BlockProducts {
 pub(crate) struct ProcessEffect {
     /// Covariance of the two unknowns of the shape, 2 × 2.
     pub(crate) shape_covariance: DMatrix<f64>,
-    /// Covariance of the two unknowns of the shape with the score, `2 × parameters`, for a shape of
-    /// phase zero.
+    /// Covariance between the two unknowns of the shape and the score (2 × parameters), for a shape
+    /// whose phase is zero.
     pub(crate) cross: DMatrix<C>,
 }
 

@@ -62,8 +62,8 @@ pub(crate) struct ForceModel<'a> {
     pub(crate) directions: &'a [f64],
 }
 
-/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e, where φ_r h_r with h_r = 1/(jω − λ_r) are the columns
-/// of B, and V is the covariance of the line. The memory is reused from line to line.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e. The columns of B are φ_r h_r with h_r = 1/(jω − λ_r),
+/// e is the residual on the line, and V is its covariance. The memory is reused from line to line.
 #[derive(Default)]
 pub(crate) struct Posterior {
     active: Vec<usize>,

@@ -63,7 +63,7 @@ fn series(k: usize, a: C, b: C) -> C {
 
 /// Returns sinh(z) / z.
 fn sinhc(z: C) -> C {
-    // The next term of the series 1 + z²/6 is below the rounding ε.
+    // For |z| < 1e-8 the term z²/6 of the series 1 + z²/6 + … is below the rounding ε.
     if z.norm() < 1e-8 { C::from(1.0) } else { z.sinh() / z }
 }
 

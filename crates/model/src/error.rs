@@ -133,7 +133,7 @@ pub enum ModelError {
     /// A word is not one of the choices.
     #[error("there is no {what} `{name}`: choose one of {known}")]
     UnknownName {
-        /// Kind of item to be named.
+        /// Kind of item that the word should name.
         what: &'static str,
         /// The word given.
         name: String,
@@ -174,7 +174,7 @@ pub enum ModelError {
         rows: usize,
         /// Number of columns of the matrix.
         columns: usize,
-        /// Number of parameters named.
+        /// Number of parameters to which the covariance belongs.
         parameters: usize,
     },
     /// A variance is negative, or a covariance is not finite.
@@ -248,7 +248,7 @@ fn names(dof: usize) -> String {
     }
 }
 
-/// Returns an error that names `value` unless it is finite and `holds` is true.
+/// Returns [`ModelError::Parameter`] unless `value` is finite and `holds` is true.
 pub(crate) fn require(
     name: &'static str,
     value: f64,

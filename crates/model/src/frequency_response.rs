@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn one_degree_of_freedom_by_hand() {
-        // 8 − 9·2 + 3·1.5i = −10 + 4.5i; its inverse (−10 − 4.5i)/120.25.
+        // 8 − 9·2 + 3·1.5i = −10 + 4.5i; its inverse is (−10 − 4.5i)/120.25.
         let s = SecondOrderSystem::new(dmatrix![2.0], dmatrix![1.5], dmatrix![8.0]).unwrap();
         assert_eq!(s.dynamic_stiffness(3.0)[(0, 0)], Complex::new(-10.0, 4.5));
         let h = s.receptance(3.0).unwrap()[(0, 0)];

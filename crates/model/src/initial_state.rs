@@ -15,8 +15,8 @@ impl InitialState {
     /// Creates a state from x(0) (m) and ẋ(0) (m/s).
     ///
     /// # Errors
-    /// [`ModelError::StateLength`] if they differ in length, [`ModelError::StateNotFinite`] at the
-    /// first NaN or infinity.
+    /// [`ModelError::StateLength`] if x(0) and ẋ(0) have different lengths,
+    /// [`ModelError::StateNotFinite`] at the first NaN or infinity.
     pub fn new(displacement: DVector<f64>, velocity: DVector<f64>) -> Result<Self, ModelError> {
         let (got, dof) = (velocity.len(), displacement.len());
         if got != dof {

@@ -10,9 +10,9 @@ use crate::{ModelError, SecondOrderSystem};
 /// Sources use different signs, which lead to different eigenvalues, so that there is no default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum KyxSign {
-    /// + Kyx x: the coefficient is the entry of the stiffness matrix.
+    /// The term is + Kyx x: Kyx is an entry of the stiffness matrix.
     Plus,
-    /// − Kyx x, as in Dissertation eqs. (4.2.3) and (4.5.26).
+    /// The term is − Kyx x, as in Dissertation eqs. (4.2.3) and (4.5.26).
     Minus,
 }
 
@@ -121,7 +121,7 @@ impl JournalBearing {
         self.mass
     }
 
-    /// The coefficients of the oil film alone.
+    /// The coefficients of the oil film, without the support springs.
     pub fn film(&self) -> OilFilm {
         self.film
     }

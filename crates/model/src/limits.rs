@@ -37,7 +37,8 @@ pub(crate) const INSTANTS: usize = 128;
 /// Maximum number of Newton steps for one amplitude of a backbone.
 pub(crate) const BACKBONE_NEWTON_STEPS: usize = 30;
 
-/// Newton step, relative to amplitude and frequency, that ends the iteration for a backbone.
+/// Maximum Newton step, relative to amplitude and frequency, at which the iteration for a point of
+/// a backbone ends.
 pub(crate) const BACKBONE_STEP: f64 = 1e-11;
 
 /// Maximum number of attempts from one amplitude of a backbone to the next; each failure halves the
@@ -51,7 +52,8 @@ pub(crate) const PARAMETER_STEP: f64 = 0.1;
 /// undamped.
 pub(crate) const UNDAMPED: f64 = 1e-6;
 
-/// Maximum exponent of a power law; the backbone resolves its harmonics up to this exponent.
+/// Maximum exponent of a power law. A backbone has the same number of harmonics: the ninth power of
+/// a cosine has harmonics up to the ninth.
 pub(crate) const HIGHEST_EXPONENT: u32 = 9;
 
 // The following limits are for machines that consist of named elements.

@@ -8,7 +8,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use crate::limits;
 use crate::{ModelError, SecondOrderSystem};
 
-/// Largest modulus of an eigenvalue, relative to the largest eigenvalue, at which the eigenvalue
+/// Maximum ratio of the modulus of an eigenvalue to the largest modulus, for which the eigenvalue
 /// may be a double zero (rigid-body mode) with rounding errors: about √ε (pure number).
 pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
@@ -180,7 +180,8 @@ impl SecondOrderSystem {
         if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
             return Err(ModelError::StateMatrixOverflow { largest });
         }
-        // Displacements and velocities differ by a factor ω: balance before iterating.
+        // Displacements and velocities differ by a factor ω; the matrix is therefore balanced
+        // before the QR iteration.
         let balance = balance_parlett_reinsch(&mut a);
         let schur =
             RealSchur::new(a).map_err(|_| ModelError::ModesNotConverged { dof: self.dof() })?;
@@ -284,7 +285,8 @@ impl Decomposition {
         for (q, y) in self.schur.q.column_iter().zip(&state) {
             balanced.zip_apply(&q, |z: &mut Complex<f64>, q| *z += y * q);
         }
-        // Inverse iteration gives φ and λφ; the half with more digits is kept.
+        // Inverse iteration gives the state [φ; λφ]. The half with the larger norm is kept, because
+        // it has more correct digits.
         let n = len / 2;
         let first = if balanced.rows(0, n).norm() < balanced.rows(n, n).norm() { n } else { 0 };
         let half = balanced.rows(first, n).zip_map(&self.balance.rows(first, n), |z, b| z * b);

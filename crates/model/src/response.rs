@@ -16,8 +16,8 @@ impl Response {
     /// Creates a response from its three records (m, m/s, m/s²), sampled at the same instants.
     ///
     /// # Errors
-    /// [`ModelError::Channels`] or [`ModelError::Signal`] if they do not share channels and time
-    /// axis.
+    /// [`ModelError::Channels`] or [`ModelError::Signal`] if the records differ in the number of
+    /// channels or in the time axis.
     pub fn new(
         displacement: Record,
         velocity: Record,

@@ -36,7 +36,7 @@ use crate::error::require;
 pub fn npi_sampling(npi: f64, len: usize, omega_n: f64) -> Result<Sampling, ModelError> {
     require("NPI", npi, "positive and finite", npi > 0.0)?;
     require("natural frequency", omega_n, "positive and finite", omega_n > 0.0)?;
-    // `Sampling` refuses `len` = 0. The step is computed before that and must be finite.
+    // `Sampling` refuses `len` = 0. The step is computed before this check and must be finite.
     Ok(Sampling::new(TAU * npi / (len.max(1) as f64 * omega_n), len)?)
 }
 

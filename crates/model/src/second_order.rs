@@ -82,8 +82,9 @@ impl SecondOrderSystem {
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
-    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades (beyond
-    /// 64 degrees of freedom, their largest and smallest are estimated by iteration).
+    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades. For more
+    /// than 64 degrees of freedom, the largest and the smallest singular value are estimated by
+    /// iteration.
     pub fn new(
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
@@ -98,8 +99,8 @@ impl SecondOrderSystem {
         {
             check(matrix, entries, dof)?;
         }
-        // Solvers factor M by LU decomposition, so that a matrix without a regular LU decomposition
-        // is refused here, too.
+        // Solvers use the LU decomposition of M. This check therefore also refuses an M whose
+        // factor U is singular.
         let factored = mass.clone().lu();
         let reciprocal_condition = reciprocal_condition(&mass, &factored);
         let invertible = factored.is_invertible();
@@ -172,7 +173,7 @@ fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f6
     let (lower, upper) = (factored.l(), factored.u());
     let mut large = DVector::from_fn(n, |i, _| 1.0 + 0.37 * (i % 5) as f64);
     let mut small = large.clone();
-    // A few iterations are enough for the order of magnitude.
+    // A few iterations are enough for the order of magnitude of the singular values.
     for _ in 0..6 {
         large = mass.tr_mul(&(mass * large.normalize()));
         small.normalize_mut();

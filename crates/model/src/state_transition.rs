@@ -34,7 +34,7 @@ use mechid_numerics::linear_algebra::exponential;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateTransition {
-    /// Φ, 2n × 2n, a pure number.
+    /// Φ, 2n × 2n, dimensionless.
     pub state: DMatrix<f64>,
     /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input that keeps its initial value
     /// over the step.
@@ -99,7 +99,7 @@ impl StateTransition {
         Self { state, held, ramp: DMatrix::zeros(2 * n, n) }
     }
 
-    /// Returns the rate matrix A in step units, 2n×2n, a pure number.
+    /// Returns the rate matrix A in step units, 2n×2n, dimensionless.
     ///
     /// # Source
     /// Dissertation eqs. (4.5.8) and (4.5.26), there in s⁻¹ and s⁻².

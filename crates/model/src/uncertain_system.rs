@@ -33,13 +33,13 @@ pub struct UncertainSystem {
 }
 
 impl UncertainSystem {
-    /// Creates a system with the covariance of these entries, one row and column each, in the
-    /// products of their units (kg, N·s/m, N/m).
+    /// Creates a system whose entries `parameters` are uncertain. The covariance has one row and
+    /// one column per parameter, in products of their units (kg, N·s/m, N/m).
     ///
     /// # Errors
-    /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
-    /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
-    /// [`ModelError::RepeatedParameter`] if a parameter is named twice,
+    /// [`ModelError::CovarianceShape`] unless the covariance has one row and one column per
+    /// parameter, [`ModelError::Covariance`] if it has a negative variance or an entry that is not
+    /// finite, [`ModelError::RepeatedParameter`] if a parameter is named twice,
     /// [`ModelError::NoSuchParameter`] if a parameter belongs to a system of another size.
     pub fn new(
         system: SecondOrderSystem,
@@ -70,8 +70,8 @@ impl UncertainSystem {
         &self.parameters
     }
 
-    /// Covariance of the uncertain entries, one row and column each, in the products of their units
-    /// (kg, N·s/m, N/m).
+    /// Covariance of the uncertain entries, with one row and one column per entry, in the products
+    /// of the units of the entries (kg, N·s/m, N/m).
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }
@@ -84,7 +84,8 @@ impl UncertainSystem {
     }
 }
 
-/// Checks that a covariance belongs to parameters of these names.
+/// Checks that a covariance has one row and one column per name, finite entries and no negative
+/// variance, and that no name is repeated.
 pub(crate) fn check_covariance(
     names: &[String],
     covariance: &DMatrix<f64>,

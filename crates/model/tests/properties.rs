@@ -87,7 +87,8 @@ proptest! {
     #[test]
     fn shapes_solve_the_quadratic_eigenvalue_problem(s in systems()) {
         for mode in s.modes().unwrap() {
-            // The modes are backward stable up to the balancing of the state matrix.
+            // The computation of the modes is backward stable, except for the balancing of the
+            // state matrix.
             prop_assert!(residual(&s, &mode) < 1e-12, "{:?}", mode);
             let largest = mode.shape().iter().map(|z| z.norm()).fold(0.0, f64::max);
             prop_assert!((largest - 1.0).abs() < 1e-15);
@@ -99,7 +100,8 @@ proptest! {
 
     #[test]
     fn coordinates_do_not_matter(s in systems(), seed in 0u64..100) {
-        // In coordinates x = T q the mass is Tᵀ M T and so on, and the shapes are transformed by T.
+        // In coordinates q with x = T q, the mass matrix is Tᵀ M T; C and K are transformed in the
+        // same way. A shape φ in q is the shape T φ in x.
         let t = coordinates(s.dof(), seed);
         let turn = |a: &DMatrix<f64>| t.transpose() * a * &t;
         let turned =
@@ -168,8 +170,9 @@ fn a_long_chain_has_its_known_frequencies() {
         for (j, mode) in modes.iter().enumerate() {
             let angle = (j + 1) as f64 * std::f64::consts::PI / (2 * (n + 1)) as f64;
             let omega = 2.0 * (k / m).sqrt() * angle.sin();
-            // The errors are in proportion to the largest frequency, which is up to 30 times the
-            // smallest.
+            // The errors of all frequencies are in proportion to the largest frequency. The largest
+            // frequency is up to about 30 times the smallest, so the tolerance of a relative error
+            // is larger than ε.
             assert!((mode.natural_frequency() / omega - 1.0).abs() < 1e-11, "n {n}, j {j}");
             assert!((mode.damping_ratio() - beta * omega / 2.0).abs() < 1e-11, "n {n}, j {j}");
             assert!(residual(&s, mode) < 1e-13);
@@ -209,7 +212,7 @@ fn fully_degenerate_systems_converge() {
 #[test]
 fn an_unsupported_chain_moves_as_one_body() {
     // The chain is free at both ends. Rounding moves its defective zero eigenvalue to a few √ε of
-    // the fastest rate; the mode shape is the same displacement everywhere.
+    // the fastest rate; the shape of this rigid-body mode must be the same displacement everywhere.
     for n in [2, 5, 20] {
         let chain = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
             0 if i == 0 || i == n - 1 => 1.0,

@@ -38,7 +38,8 @@ fn free_motion_by_hand() {
         (8.0, [-0.016_734_762_011_132_237, -0.078_095_556_051_950_44, 0.379_321_272_252_330_7]),
         (10.0, [0.029_022_103_322_797_543, -0.068_851_758_017_088_7, 0.228_170_376_794_251_3]),
     ];
-    // ẍ is a difference of terms that are several times as large as ẍ, hence 10 ε.
+    // ẍ is a difference of terms that are several times as large as ẍ; the tolerance is therefore
+    // about 10 ε.
     let sampling = Sampling::new(0.75, 2).unwrap();
     for (c, expected) in cases {
         let free = sdof(c).free_response(sampling, 0.3, -1.1).unwrap();
@@ -84,7 +85,8 @@ fn small_steps_keep_their_digits() {
     let t = 1e-6;
     let step = sdof(4.8).step_response(Sampling::new(t, 2).unwrap(), 4.0, 0.0, 0.0).unwrap();
     let expected = 0.5 * (4.0 / 2.0) * t * t * (1.0 - 2.4 * t / 3.0);
-    // The next term of the series has the relative size (ωn t)² / 12 < 1e-12.
+    // The first term that this series of the step response omits has a relative size below (ωn t)²
+    // / 12 < 1e-12.
     assert!((sample(&step, 1)[0] / expected - 1.0).abs() < 1e-12);
 }
 
@@ -100,7 +102,7 @@ fn stiff_overdamped_motion_keeps_its_slow_part() {
 
 #[test]
 fn undamped_resonance_grows_linearly() {
-    // x = F t sin(ωn t) / (2 m ωn) from rest under F cos(ωn t).
+    // The exact response from rest to the force F cos(ωn t) is x = F t sin(ωn t) / (2 m ωn).
     let sampling = Sampling::new(0.037, 2000).unwrap();
     let r = sdof(0.0).harmonic_response(sampling, 3.0.into(), 2.0, 0.0, 0.0).unwrap();
     let largest = 3.0 * sampling.duration() / 8.0;
@@ -171,7 +173,7 @@ fn a_held_force_is_a_sum_of_steps() {
 fn a_linear_force_is_the_limit_of_finer_and_finer_held_ones() {
     // Each sampling interval of a linear force is divided into r parts, and the force is held at
     // the midpoint value of each part. The error of the response is then O(1/r²); Richardson's
-    // combination of r and 2r has an error of O(1/r⁴).
+    // combination of the responses for r and 2r parts has an error of O(1/r⁴).
     let dt = 0.2;
     let force = forces(60);
     let refined = |c: f64, r: usize| -> Vec<f64> {
@@ -227,8 +229,8 @@ fn bad_input_is_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Reference: ẋ and ẍ are the derivatives of x, for any damping and any frequency. Since ẍ
-    /// follows from the equation of motion, the equation then holds.
+    /// Reference: ẋ is the derivative of x, and ẍ is the derivative of ẋ, for any damping and any
+    /// frequency. ẍ is computed from the equation of motion, so x satisfies this equation.
     #[test]
     fn harmonic_motion_satisfies_the_equation_of_motion(
         zeta in 0.0..3.0f64, omega_n in 0.5..5.0f64, omega in 0.0..6.0f64, phase in 0.0..6.3f64,

@@ -38,8 +38,8 @@ impl ChannelPhase {
         [Complex::cis(common - omega * self.delay), Complex::cis(common)]
     }
 
-    /// Returns force and response before the measuring channels, for records of one period (samples
-    /// × channels; N, and m, m/s or m/s²).
+    /// Returns the true force and response, without the delay and the phase of the measuring
+    /// channels, for records of one period (samples × channels; N, and m, m/s or m/s²).
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if the time axes of the records differ, or values overflow.
@@ -78,8 +78,9 @@ impl ChannelPhase {
     }
 }
 
-/// Returns the displacement lines of a response below half the sampling rate; the mean is kept for
-/// displacements and zero for velocities and accelerations.
+/// Converts the lines of a measured response to lines of the displacement, and returns those below
+/// half the sampling rate. The mean is kept if the displacement was measured, and set to zero if
+/// the velocity or the acceleration was measured.
 pub(super) fn displacement_lines(
     response: &Spectrum,
     measured: ResponseQuantity,

@@ -28,10 +28,12 @@ pub(super) struct ByPeriods {
 }
 
 impl Uncertainty {
-    /// Uses the scatter of the periods if the residual does not exceed the noise of the periods.
-    /// Otherwise it uses the blocks of the residual or, for a record too short for blocks, the
-    /// scatter times the ratio of residual to noise. The number of degrees of freedom is the
-    /// smallest one of the first `wanted` parameters.
+    /// Computes the covariance from the scatter of the periods if the residual power does not
+    /// exceed the noise power of the periods. Otherwise the covariance comes from the blocks of the
+    /// residual; for a record too short for blocks, it is the covariance from the scatter times the
+    /// ratio of the residual power to the noise power. Without `by_periods`, the covariance comes
+    /// from the residual. The number of degrees of freedom is the smallest one of the first
+    /// `wanted` parameters.
     ///
     /// # Source
     /// Birge (1932), Physical Review 40, 207–227, for standard errors scaled by the residual.
@@ -149,8 +151,8 @@ impl BlockScores {
 
     /// Returns the smallest number of Satterthwaite's degrees of freedom of the first `wanted`
     /// parameters. Parameter k has (Σ w)²/Σ w² − 1 degrees of freedom, where w = \[(AᵀA)⁻¹ A_bᵀA_b
-    /// (AᵀA)⁻¹\]_kk is the information of each block. Initial states, which follow these
-    /// parameters, depend on the first block only and are ignored.
+    /// (AᵀA)⁻¹\]_kk is the contribution of block b to the variance of the parameter. Initial
+    /// states, which follow these parameters, depend on the first block only and are ignored.
     fn degrees_of_freedom(&self, inverse: &DMatrix<f64>, wanted: usize) -> usize {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);
@@ -167,8 +169,8 @@ impl BlockScores {
     }
 }
 
-/// Returns a weighted column of lines as a time signal. Its sum of squares equals that of the real
-/// and imaginary parts of the lines.
+/// Returns a weighted column of lines as a time signal. The sum of squares of the signal equals the
+/// sum of squares of the real and imaginary parts of the lines.
 pub(super) fn in_time(
     grid: &Grid,
     lines: usize,

@@ -44,8 +44,8 @@ pub struct Solution {
     /// determined directions. The covariance of coefficients (i, a) and (j, b) is
     /// `unscaled_covariance[(i, j)] · residual_covariance[(a, b)]`.
     pub unscaled_covariance: DMatrix<f64>,
-    /// EᵀE / (rows − unknowns) with the residuals E: right-hand sides × right-hand sides, in the
-    /// units of the targets; infinite without excess rows.
+    /// EᵀE / `degrees_of_freedom` with the residuals E: right-hand sides × right-hand sides, in the
+    /// units of the targets; infinite if there are no degrees of freedom.
     pub residual_covariance: DMatrix<f64>,
     /// √(Σe² / Σb²) of each right-hand side b with its residual e, a pure number.
     pub residual_nrmse: Vec<f64>,

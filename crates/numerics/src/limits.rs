@@ -55,8 +55,8 @@ pub(crate) const PATIENCE: usize = 20;
 /// converge.
 pub(crate) const SWEEPS: usize = 100;
 
-/// Number of rows of a block of a tall matrix that is multiplied at a time: a block of a hundred
-/// columns then fits in the cache of a core.
+/// Number of rows per block in products of tall matrices: a block of a hundred columns then fits in
+/// the cache of a core.
 pub(crate) const PRODUCT_ROWS: usize = 1024;
 
 /// Maximum number of degrees of freedom for which products of pairs of regressors are computed as

@@ -99,7 +99,7 @@ impl RealSchur {
 }
 
 /// Searches upwards from `last` for the first negligible subdiagonal entry, sets it to zero, and
-/// returns the row below it.
+/// returns its row; returns 0 if no entry is negligible.
 fn first_of_unreduced(h: &mut DMatrix<f64>, last: usize, norm: f64) -> usize {
     for at in (1..=last).rev() {
         let neighbours = h[(at, at)].abs() + h[(at - 1, at - 1)].abs();
@@ -238,7 +238,8 @@ mod tests {
         }
         for size in 1..5 {
             check(&DMatrix::zeros(size, size));
-            // Ordinary shifts do not change a cyclic permutation.
+            // Ordinary shifts do not change a cyclic permutation, so only the exceptional shifts
+            // let the iteration converge.
             check(&DMatrix::from_fn(size, size, |i, j| f64::from((j + 1) % size == i)));
         }
     }

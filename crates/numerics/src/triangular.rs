@@ -211,7 +211,7 @@ impl Reflection {
             return Self { row, tau: 0.0, scale: 0.0 };
         }
         let alpha = r[(row, row)];
-        // The opposite sign avoids cancellation.
+        // The sign of beta is opposite to that of alpha, so that alpha − beta has no cancellation.
         let beta = -(alpha * alpha + square).sqrt().copysign(alpha);
         r[(row, row)] = beta;
         Self { row, tau: (beta - alpha) / beta, scale: 1.0 / (alpha - beta) }

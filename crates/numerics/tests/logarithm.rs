@@ -78,8 +78,9 @@ fn clustered_eigenvalues_cost_no_accuracy() {
 
 #[test]
 fn nearly_defective_matrices_are_as_accurate_as_their_conditioning_allows() {
-    // The eigenvalues 0.9 and 0.9 + gap are coupled by an entry of 1. The exact logarithm has the
-    // divided difference of ln, which ln1p(gap/0.9)/gap gives without cancellation.
+    // The eigenvalues 0.9 and 0.9 + gap are coupled by an entry of 1. The off-diagonal entry of the
+    // exact logarithm is the divided difference of ln, (ln(0.9 + gap) − ln 0.9)/gap. The formula
+    // ln1p(gap/0.9)/gap gives it without cancellation.
     for gap in [1e-1, 1e-4, 1e-8, 1e-13] {
         let a = dmatrix![0.9, 1.0; 0.0, 0.9 + gap];
         let actual_gap = a[(1, 1)] - 0.9;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use mechid_plot::charts::{self, FrequencyResponse, Quantity, Series};
 use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
 
-/// Mass, damping and stiffness of the machine in all figures.
+/// Mass (kg), damping (N·s/m) and stiffness (N/m) of the machine, the same in all figures.
 const MACHINE: (f64, f64, f64) = (10.0, 180.0, 5000.0);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

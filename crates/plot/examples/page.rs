@@ -10,7 +10,7 @@ use mechid_plot::{Axis, DrawnMode, ShapeDrawing, page_of};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("."), PathBuf::from);
-    // 10 kg on 5,000 N/m and 18 N·s/m.
+    // The machine is a mass of 10 kg on a spring of 5,000 N/m and a damper of 18 N·s/m.
     let response = |hz: f64| {
         let omega = TAU * hz;
         let (re, im) = (5000.0 - 10.0 * omega * omega, 18.0 * omega);

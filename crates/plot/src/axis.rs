@@ -11,10 +11,10 @@ pub const ROUNDING: f64 = 1e-12;
 /// Linear or logarithmic scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
-    /// Equal distances mean equal differences.
+    /// Equal distances on the axis are equal differences of the values.
     #[default]
     Linear,
-    /// Equal distances mean equal ratios.
+    /// Equal distances on the axis are equal ratios of the values.
     Log10,
 }
 

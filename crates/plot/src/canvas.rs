@@ -253,9 +253,9 @@ impl Canvas {
         if style.weight == Weight::Bold {
             self.body.push_str(r#" font-weight="bold""#);
         }
-        // The length of a text is written only where it is reliable and needed: italics are not
-        // measured, renderers differ for superscripts and subscripts, and a text of one or two
-        // characters does not need it.
+        // The length of a text is written only if it is reliable and needed. It is not reliable for
+        // italics, which are not measured, and for superscripts and subscripts, which renderers
+        // draw differently. It is not needed for a text of one or two characters.
         let plain = !style.italic && runs(text).len() == 1;
         if plain && text.chars().nth(2).is_some() {
             let length = num(text_width(text, style.size, style.weight));
@@ -393,7 +393,7 @@ pub(crate) fn escape(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // XML 1.0 cannot represent the other control characters.
+            // XML 1.0 cannot represent most control characters, so each is replaced by a space.
             control if control.is_control() => out.push(' '),
             other => out.push(other),
         }

@@ -80,8 +80,8 @@ pub struct FrequencyResponse<'a> {
     pub standard_error: &'a [f64],
 }
 
-/// Returns a Bode plot: measured points under fitted lines, magnitude above phase (degrees). A line
-/// of the phase is interrupted at jumps of more than 180°.
+/// Returns a Bode plot: measured points under fitted lines, magnitude above phase (degrees). Lines
+/// in the phase panel are interrupted at jumps of more than 180°.
 ///
 /// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`, and `magnitude` the
 /// ordinate of the upper panel, such as `Axis::log10("Receptance", "m/N")`; the fits may have a

@@ -11,7 +11,8 @@ use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
 use crate::trace::{self, Mappings, Segment};
 
-/// Maximum width or height of a figure, px; larger ones would overflow on a short axis.
+/// Maximum width or height of a figure, px; in a larger figure, the pixels per unit of a short axis
+/// would overflow.
 const LARGEST: f64 = 1e9;
 
 /// Length of a tick, px.
@@ -24,7 +25,7 @@ const EDGE: f64 = 10.0;
 const TITLE: f64 = 28.0;
 /// Height of the title of a panel, px.
 const PANEL_TITLE: f64 = 21.0;
-/// Height of the common factor of the labels, px.
+/// Height of the text of the common factor of the tick labels, such as ×10⁻³, px.
 const FACTOR: f64 = 15.0;
 /// Height of the caption of an axis, px.
 const CAPTION: f64 = LABEL_SIZE + 9.0;
@@ -344,7 +345,8 @@ fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
         };
         let (x, y) = (panel.x_range(extent, markers), panel.y_range());
         for (axis, (low, high)) in [(&panel.x, x), (&panel.y, y)] {
-            // The range of numbers near the limits of f64 may have no margin or an infinite length.
+            // The range of an axis may have no margin and a length of zero, or an infinite length,
+            // if the values are near the limits of f64.
             let length = axis.scale.forward(high) - axis.scale.forward(low);
             if !(length > TINY && length.is_finite()) {
                 return Err(PlotError::Range { axis: axis.caption(), low, high });

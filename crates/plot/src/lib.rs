@@ -29,8 +29,8 @@
 //!
 //! [`charts`] has the most frequent figures; [`Canvas`] draws sketches other than plots.
 //!
-//! Text is shaped and bitmaps are made by `resvg`. The axes are our own, because no plotting crate
-//! aligns the frames of stacked panels, keeps legends off the curves and writes exponents.
+//! The crate `resvg` sets the text and makes the bitmaps. The axes are our own, because no plotting
+//! crate aligns the frames of stacked panels, keeps legends off the curves and writes exponents.
 //!
 //! Every figure has a palette for colour-blind readers with a dash and a marker for each colour,
 //! legends that hide no curve, the same style for the same method in every figure, ticks at round

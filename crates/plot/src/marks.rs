@@ -7,7 +7,8 @@ use crate::style::{Color, Marker, Resolved};
 /// Opacity of a shaded band.
 pub(crate) const BAND_OPACITY: f64 = 0.22;
 
-/// Minimum radius of a marker, px; stems that are closer together are drawn without markers.
+/// Minimum radius of a marker, px; stems so close together that their markers would be at most this
+/// large are drawn without markers.
 pub(crate) const LEAST_RADIUS: f64 = 1.4;
 
 /// Returns the radius, in px, at which `count` markers do not overlap in a panel of this width.

@@ -90,7 +90,7 @@ impl Panel {
         self
     }
 
-    /// Gives the panel another ordinate.
+    /// Replaces the ordinate axis of the panel.
     #[must_use]
     pub fn y(mut self, axis: Axis) -> Self {
         self.y = axis;
@@ -267,11 +267,13 @@ impl Panel {
             && self.curves.iter().any(|curve| curve.kind == Kind::Stems);
         if from_zero {
             let (low, high) = padded(Scale::Linear, low.min(0.0), high.max(0.0), 0.06);
-            // Stems with positive values begin at the frame.
+            // The stems begin at the lower edge of the frame, without a margin, if no value is
+            // negative.
             let rising = !self.curves.iter().flat_map(Curve::ordinates).any(|value| value < 0.0);
             return (if rising { 0.0 } else { low }, high);
         }
-        // Values that are rounding errors of the largest value would extend a logarithmic axis.
+        // Values as small as the rounding error of the largest value would extend a logarithmic
+        // axis by many decades.
         let low = if self.y.scale == Scale::Log10 { low.max(ROUNDING * high) } else { low };
         padded(self.y.scale, low, high, 0.06)
     }

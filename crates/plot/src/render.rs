@@ -48,7 +48,7 @@ impl Figure {
     }
 
     /// Saves the figure. The extension of `path` selects the format: SVG, or PNG with two pixels
-    /// per px.
+    /// for each px of the drawing.
     ///
     /// The file is written completely or not at all: a temporary file in the same folder is
     /// renamed.

@@ -28,7 +28,7 @@ impl Format {
 }
 
 /// Saves an SVG document. The extension of `path` selects the format: SVG (unchanged), or PNG with
-/// two pixels per px.
+/// two pixels for each px of the drawing.
 ///
 /// # Errors
 /// [`PlotError::Extension`] unless the extension is `.svg` or `.png`, [`PlotError::Raster`] for a

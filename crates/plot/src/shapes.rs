@@ -106,9 +106,10 @@ impl ShapeDrawing {
     }
 
     /// Draws the first mode at its largest deflection on the undeformed lines, and small drawings
-    /// of all modes, with the numbers for the script. The script animates the modes, so that
-    /// complex modes travel. The canvas is empty if there are no modes, if a line has a missing
-    /// point, if a mode has no displacement for one of the points, or if a number is not finite.
+    /// of all modes, with the numbers for the script. The script animates the modes: complex modes
+    /// appear as travelling waves. The canvas is empty if there are no modes, if a line has a
+    /// missing point, if a mode has no displacement for one of the points, or if a number is not
+    /// finite.
     pub fn draw(&self, label: &str) -> DrawnSet {
         let Some(first) = self.modes.first().filter(|_| self.is_drawable()) else {
             return DrawnSet { svg: Canvas::new(SIZE.0, SIZE.1).finish(label), map: Vec::new() };
@@ -205,12 +206,12 @@ impl View {
     }
 }
 
-/// Maximum number of modes for which the squares of a matrix have numbers; with more modes, the
-/// numbers do not fit.
+/// Maximum number of modes for which each square of a drawn matrix contains its value; with more
+/// modes, the values do not fit into the squares.
 const NUMBERED: usize = 20;
 
-/// Draws a matrix of pure numbers from 0 to 1, row by row, as squares with their numbers; larger
-/// numbers are darker.
+/// Draws a matrix of pure numbers from 0 to 1, row by row, as one square for each number, with the
+/// number in it; squares of larger numbers are darker.
 pub fn matrix_of_squares(values: &[Vec<f64>], label: &str) -> String {
     const EDGE: f64 = 34.0;
     let (rows, columns) = (values.len(), values.iter().map(Vec::len).max().unwrap_or(0));

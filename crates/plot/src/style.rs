@@ -30,7 +30,7 @@ impl Color {
     pub const BLACK: Color = Color("#000000");
     /// Dark grey: frames and tick labels.
     pub const DARK: Color = Color("#333333");
-    /// Middle grey: the background.
+    /// Middle grey: lines in the background, such as a measurement behind its fit.
     pub const GREY: Color = Color("#808080");
     /// White: the paper.
     pub const WHITE: Color = Color("#ffffff");

@@ -41,7 +41,8 @@ pub(crate) enum Level {
     Lowered,
 }
 
-/// Splits `10^{−3}` and `K_{xx}` into runs; a mark without its closing brace is ordinary text.
+/// Splits a text such as `10^{−3}` or `K_{xx}` into runs of ordinary, raised and lowered
+/// characters. A `^` or `_` without a pair of braces is an ordinary character.
 pub(crate) fn runs(text: &str) -> Vec<(Level, &str)> {
     let mut runs = Vec::new();
     let (mut rest, mut searched) = (text, 0);
@@ -112,7 +113,7 @@ mod tests {
         let parts =
             text_width("Freq", 10.0, Weight::Regular) + text_width("uency", 10.0, Weight::Regular);
         assert!((parts - ten).abs() < 1e-6);
-        // Digits of the font share one advance: 1,171 of its 2,048 units.
+        // All digits of the font have the same advance width: 1,171 of the 2,048 units per em.
         let digits = 2.0 * 10.0 * 1171.0 / 2048.0;
         assert!((text_width("08", 10.0, Weight::Regular) - digits).abs() < 1e-9);
     }

@@ -136,7 +136,8 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         };
         let labelled = subdivisions(first..=last, &[1, 2, 5]).filter(|value| inside(*value));
         let mut labelled: Vec<f64> = labelled.collect();
-        // Only powers of ten and the ends are labelled if there is no space for all labels.
+        // Only the powers of ten, the first value and the last value are labelled if there is no
+        // space for all labels.
         if labelled.len() as f64 > wanted {
             let ends = [labelled.first().copied(), labelled.last().copied()];
             let is_decade = |value: f64| decades.iter().any(|n| is_same(value, 10f64.powi(*n)));
@@ -149,7 +150,8 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         major.extend(labelled.iter().map(|value| (*value, label(*value))));
         return Ticks { major, minor, factor: None };
     }
-    // One tick does not show the scale.
+    // One tick does not show the scale: if fewer than two decades are multiples of the stride, the
+    // labels begin at the first decade.
     let is_multiple = |n: &&i32| n.rem_euclid(stride) == 0;
     let origin = if decades.iter().filter(is_multiple).count() < 2 { decades[0] } else { 0 };
     for &n in &decades {
@@ -172,8 +174,8 @@ fn is_same(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < 1e-6
 }
 
-/// Returns the ticks of an axis with less than one decade between labelled powers: 1, 2, 5 within
-/// the decade, or linear ticks if these are too few.
+/// Returns the ticks of a logarithmic axis that contains at most one power of ten: labels at 1, 2
+/// and 5 times powers of ten, or the ticks of a linear axis if these labels are fewer than three.
 fn short_logarithmic(
     low: f64,
     high: f64,
@@ -241,7 +243,8 @@ mod tests {
             labels(&linear(1.9, 4.1, 11.0, None)),
             ["2.0", "2.2", "2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6", "3.8", "4.0"]
         );
-        // With steps of 50, the last tick would be at 200, so the steps are finer.
+        // With steps of 50, the last tick would be at 200, far from the end of the axis at 249, so
+        // the steps are finer.
         let to_the_end = linear(0.0, 249.0, 11.0, None);
         assert_eq!(to_the_end.major.last().unwrap().1, "240");
         // A narrow axis has no space for finer steps.

@@ -31,7 +31,8 @@ pub enum ProblemError {
     /// The system or its frequency response cannot be evaluated.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The response is not finite: an unstable system overflowed.
+    /// The record is not valid; for example, the response of an unstable system overflowed, or a
+    /// noise level is out of range.
     #[error(transparent)]
     Signal(#[from] SignalError),
     /// A decomposition fails.

@@ -77,8 +77,8 @@ pub fn exact_foh_periodic(
 /// applied there is that cosine.
 ///
 /// # Errors
-/// [`ProblemError::Model`] if the force does not fit, or if a line of the period (driven or not) is
-/// an undamped resonance.
+/// [`ProblemError::Model`] if the number of force channels differs from the number of degrees of
+/// freedom, or if a line of the period (driven or not) is an undamped resonance.
 ///
 /// # Source
 /// Clough & Penzien, *Dynamics of Structures*, the chapter on periodic loading (line by line).
@@ -167,7 +167,8 @@ fn periodic(
     // An unstable system may overflow over the period; a matrix with infinite entries has no
     // singular values.
     if growth.is_finite() {
-        // The condition number of I − Φᴺ is not used: without damping, the whole matrix may vanish.
+        // The smallest singular value is not divided by the largest one, as in a condition number:
+        // without damping, all singular values of I − Φᴺ may be zero up to rounding.
         reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
     // Φᴺ is a product of N matrices, which has a rounding error of about N ε.

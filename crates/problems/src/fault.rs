@@ -147,8 +147,8 @@ impl Fault {
     }
 }
 
-/// Adds sines at multiples n of the rotation frequency, at `omega(n)` rad per sample, with
-/// amplitudes relative to `unit`.
+/// Adds a sine at each multiple n of the rotation frequency. The angular frequency of the sine is
+/// `omega(n)` rad per sample, and its amplitude is relative to `unit`.
 fn add_run_out(
     column: &mut [f64],
     omega: impl Fn(i32) -> f64,

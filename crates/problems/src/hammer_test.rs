@@ -48,7 +48,7 @@ pub enum MadeFault {
 /// A record of a [`HammerTest`].
 #[derive(Debug, Clone)]
 pub struct HammerRecord {
-    /// Force on the degree of freedom of the hits, in N.
+    /// Force on the degree of freedom that the hammer hits, in N.
     pub force: Record,
     /// Response of all degrees of freedom, samples × degrees of freedom.
     pub response: Record,
@@ -80,8 +80,8 @@ impl HammerTest {
     /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (orthogonality of modes).
     pub fn system(&self) -> Result<SecondOrderSystem, ProblemError> {
         let inverse = self.shapes.clone().lu().try_inverse().unwrap_or_else(|| {
-            // If there is no inverse, the NaN values make the constructor of the system refuse the
-            // mass.
+            // M becomes NaN if the matrix of the mode shapes has no inverse, and the constructor of
+            // the system rejects it.
             DMatrix::from_element(self.shapes.nrows(), self.shapes.ncols(), f64::NAN)
         });
         let of = |modal: &dyn Fn(f64, f64) -> f64| {

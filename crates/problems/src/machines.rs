@@ -1,5 +1,6 @@
-//! Seeded machines like those on test rigs, each with a steady multisine test: chains of masses,
-//! fixed, softly suspended or free, driven at every mass or at one.
+//! Random machines from a seed, similar to those on test rigs, each with a steady multisine test.
+//! The machines are chains of masses that are fixed, softly suspended or free, and driven at every
+//! mass or at one mass.
 
 use std::f64::consts::TAU;
 

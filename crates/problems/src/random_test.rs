@@ -10,9 +10,9 @@ use crate::exact::exact_harmonic_periodic;
 /// A window of the steady state under a Gaussian random force; the period of the force is four
 /// times the length of the window.
 ///
-/// The lines of the force reach up to [`RandomTest::BAND`] of the sampling rate, as behind an
-/// anti-aliasing filter, and the response is exact at each of them. The window begins and ends
-/// during the motion.
+/// The lines of the force reach up to the fraction [`RandomTest::BAND`] of the sampling rate, as
+/// behind an anti-aliasing filter, and the response is exact at each of them. The window begins and
+/// ends during the motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RandomTest {
     /// The machine, driven at every degree of freedom by an independent force.

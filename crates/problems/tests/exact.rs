@@ -42,8 +42,8 @@ fn repeated(force: &Record, times: usize) -> Record {
     Record::new(force.sampling().with_len(len * times).unwrap(), data).unwrap()
 }
 
-/// Returns the superposition of the 2n complex modes q̇ = λ q + b F, each integrated in closed form
-/// for a force that changes linearly from its left to its right value.
+/// Returns the superposition of the 2n complex modes q̇ = λ q + b F, each integrated in closed
+/// form. During a step the force is constant or, if `linear` is true, changes linearly.
 fn by_modes(
     system: &SecondOrderSystem,
     force: &Record,
@@ -112,7 +112,7 @@ fn held_and_linear_agree_with_modal_superposition() {
 
 #[test]
 fn long_steps_are_as_exact_as_short_ones() {
-    // A force that is held between samples is the same force with eight times the sampling rate, so
+    // A force that is held between samples does not change if it is sampled eight times as fast, so
     // both responses must be equal.
     let system = random_stable(4, 11);
     let (coarse, ratio) = (random_force(4, 40, 0.4), 8);

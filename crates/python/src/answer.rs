@@ -94,7 +94,7 @@ impl Answer {
         self.0.text()
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         svg(py, Arc::clone(&self.0))
     }

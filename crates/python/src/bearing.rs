@@ -11,7 +11,8 @@ use crate::measurement::Measurement;
 use crate::responses::ResponseTable;
 use crate::{failure, work};
 
-/// Identifies a bearing from records, minus baseline records if there are any; settings are JSON.
+/// Identifies a bearing from records. If there are baseline records, subtracts their coefficients.
+/// Settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (tests, baseline, settings, time_limit, threads))]
 pub fn bearing(
@@ -34,8 +35,8 @@ pub fn bearing(
     work::watched(py, threads, || Ok(()), find).map(Answer::new)
 }
 
-/// Identifies a bearing from tables of frequency responses, minus baseline tables if there are any;
-/// settings are JSON.
+/// Identifies a bearing from tables of frequency responses. If there are baseline tables, subtracts
+/// their coefficients. Settings are JSON.
 #[pyfunction]
 #[pyo3(signature = (tests, baseline, settings, time_limit, threads))]
 pub fn bearing_of_responses(

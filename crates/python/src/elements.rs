@@ -91,7 +91,7 @@ impl IdentifiedElements {
         self.0.to_string()
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
@@ -101,7 +101,7 @@ impl IdentifiedElements {
         answer::html(py, Arc::clone(&self.0))
     }
 
-    /// Returns the report of the program, as an HTML page.
+    /// Returns the report that the program writes, as an HTML page.
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
         answer::page(py, Arc::clone(&self.0), texts)
     }

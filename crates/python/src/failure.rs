@@ -75,7 +75,7 @@ pub fn panicked(py: Python<'_>, message: &str) -> PyErr {
 /// Reads settings from JSON.
 ///
 /// # Errors
-/// `MechidError` that names the wrong field.
+/// `MechidError` whose message names the invalid field.
 pub fn settings<T: DeserializeOwned>(py: Python<'_>, json: &str) -> PyResult<T> {
     serde_json::from_str(json).map_err(|wrong| {
         let message = wrong.to_string();
@@ -88,7 +88,7 @@ pub fn settings<T: DeserializeOwned>(py: Python<'_>, json: &str) -> PyResult<T> 
 /// Returns the JSON of a result, as the program prints it.
 ///
 /// # Errors
-/// `MechidError` if it has no JSON form.
+/// `MechidError` if the result has no JSON form.
 pub fn json(py: Python<'_>, result: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string_pretty(result).map_err(|wrong| panicked(py, &wrong.to_string()))
 }

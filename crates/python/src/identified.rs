@@ -91,7 +91,7 @@ impl Identified {
         self.0.to_string()
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }
@@ -101,7 +101,7 @@ impl Identified {
         answer::html(py, Arc::clone(&self.0))
     }
 
-    /// Returns the report of the program, as an HTML page.
+    /// Returns the report that the program writes, as an HTML page.
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
         let settings = texts.settings(py)?;
         let identified = Arc::clone(&self.0);
@@ -149,7 +149,8 @@ impl Identified {
             };
             let (n, model) = (data.dof(), identified.estimate().system()?);
             let models = model.receptances(data.omega())?;
-            // The scale is unknown, so only the responses to the forces that acted are known.
+            // The receptances for a force on a degree of freedom are unknown if its equation has no
+            // known scale.
             let unknown: &[usize] = match &identified.summary().unscaled {
                 Some(unscaled) => &unscaled.degrees_of_freedom,
                 None => &[],

@@ -124,7 +124,7 @@ impl Machine {
         arrays::matrix(py, flat)
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         let machine = self.0.clone();
         let draw = move || -> Result<String, ReportError> { Ok(machine.figure()?.to_svg()?) };
@@ -138,7 +138,7 @@ impl Machine {
         work::watched(py, None, || Ok(()), draw)
     }
 
-    /// Returns the report of the program, as an HTML page.
+    /// Returns the report that the program writes, as an HTML page.
     fn page(&self, py: Python<'_>, texts: PageTexts) -> PyResult<String> {
         let settings = texts.settings(py)?;
         let machine = self.0.clone();

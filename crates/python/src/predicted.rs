@@ -51,7 +51,7 @@ impl Predicted {
         self.0.to_string()
     }
 
-    /// Returns the columns of a record of the prediction, with their names.
+    /// Returns the predicted responses as columns of a record, with their names.
     fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
         let columns = self.0.columns().into_iter();
         columns.map(|(name, values)| (name, arrays::vector(py, values.to_vec()))).collect()

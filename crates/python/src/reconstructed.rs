@@ -64,7 +64,7 @@ impl Reconstructed {
         self.0.text()
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }

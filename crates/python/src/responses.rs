@@ -140,7 +140,7 @@ impl IdentifiedResponses {
         self.0.to_string()
     }
 
-    /// Returns the figure of the program, as SVG.
+    /// Returns the figure that the program draws, as SVG.
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
         answer::svg(py, Arc::clone(&self.0))
     }

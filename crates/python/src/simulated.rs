@@ -72,7 +72,8 @@ pub fn integrate<'py>(
 }
 
 /// Computes the exact response of a machine to a force that is constant or linear between its
-/// samples; assumption and extent are JSON.
+/// samples. `between_samples` states which, and `extent` states whether the force is an open record
+/// or one whole period; both are JSON.
 #[pyfunction]
 #[pyo3(signature = (machine, force, fs, between_samples, extent, start))]
 pub fn predict<'py>(

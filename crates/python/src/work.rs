@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::{self, Failure};
 
-/// Time between two checks for signals that the interpreter has received.
+/// Time between two checks for signals of the operating system, such as the signal of Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
 
 /// Thread pool, with the identifier of the process that created it. A forked child process inherits

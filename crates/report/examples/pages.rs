@@ -1,4 +1,4 @@
-//! Writes pages of known numbers into the given folder: one response, 28 × 2 responses of 4,096
+//! Writes pages with known numbers into the given folder: one response, 28 × 2 responses of 4,096
 //! lines, and mode shapes of a frame with a stabilisation diagram. A browser test reads them.
 
 use std::f64::consts::TAU;

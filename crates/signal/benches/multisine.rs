@@ -5,9 +5,9 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_signal::{CrestSearch, Multisine, Phases, Sampling, lines};
 
-/// Measures four times: of sampling 10⁶ values with all 499,999 lines, of sampling the period of
-/// the dissertation, of a plain sum of cosines for the same period, and of one exact value, which a
-/// Runge-Kutta stage needs.
+/// Measures the duration of four computations: 10⁶ samples with all 499,999 lines, the samples of
+/// the period of the dissertation, a plain sum of cosines for the same period, and one exact value,
+/// which a Runge-Kutta stage needs.
 fn sampling(c: &mut Criterion) {
     let sampling = Sampling::new(1e-6, 1_000_000).unwrap();
     let all = lines::full(sampling);

@@ -138,7 +138,7 @@ mod tests {
             for step in [1e-12, 0.001, 0.03, 0.3] {
                 assert_eq!(clipping(&converted(&x, step)), None, "seed {seed}, step {step}");
             }
-            // The signal is held for eight samples.
+            // Each value of the signal is repeated over eight samples, which is not clipping.
             let held: Vec<f64> = x.iter().flat_map(|x| [*x; 8]).collect();
             assert_eq!(clipping(&held), None, "seed {seed}");
         }

@@ -123,10 +123,10 @@ pub fn cross_correlation_of_coloured(
 }
 
 impl Correlation {
-    /// Tests a sum of squared coefficients. Their covariance, multiplied by the number of samples,
-    /// depends only on their distance in lags: `covariance` has its values at the distances 0, 1 ….
-    /// `shared` is half of the variance that the sum has in addition to the variance for normal
-    /// variables.
+    /// Tests a sum of squared coefficients. The covariance of two coefficients depends only on
+    /// their distance in lags: `covariance` has its values at the distances 0, 1 …, multiplied by
+    /// the number of samples. The variance of the sum exceeds the variance for normal variables by
+    /// 2 · `shared`.
     fn tested(
         sum: f64,
         covariance: &[f64],
@@ -134,7 +134,8 @@ impl Correlation {
         coefficients: Vec<f64>,
         count: f64,
     ) -> Self {
-        // The coefficients hardly scatter if the spectra of input and residual hardly overlap.
+        // The variance of the coefficients is almost zero if the spectra of input and residual do
+        // not overlap; the limit avoids a division by zero.
         let variance = covariance[0].max(f64::EPSILON);
         let p_value = probability_above(sum, coefficients.len(), covariance, shared);
         let bound = 1.96 * (variance / count).sqrt();
@@ -144,8 +145,8 @@ impl Correlation {
 
 /// Returns the probability that the sum of squares of `terms` normal variables of mean zero exceeds
 /// `sum`. The covariance of two variables depends only on their distance: `covariance` has its
-/// values at the distances 0, 1 …, and it is zero at larger ones. `shared` is half of the variance
-/// that the sum has in addition to the variance for normal variables.
+/// values at the distances 0, 1 …, and it is zero at larger distances. The variance of the sum
+/// exceeds the variance for normal variables by 2 · `shared`.
 ///
 /// The sum has approximately the distribution of g χ²(h) with the same mean and variance.
 fn probability_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {

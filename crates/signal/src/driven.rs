@@ -17,8 +17,8 @@ use crate::spectrum::Spectrum;
 /// - In several periods the noise is the part that changes from period to period. The periodic part
 ///   is compared with the median scatter of the 33 lines around it by Fisher's test, at a level of
 ///   0.1 % for all lines of the record together.
-/// - In a single period the weakest lines (at least 16) are the noise if a gap is above them: a
-///   factor of 3 in amplitude without a line.
+/// - In a single period the weakest lines (at least 16) are the noise if a gap is above them: the
+///   next stronger line has more than 3 times the amplitude of the strongest of them.
 ///
 /// If the driven lines have less than half of the power of each channel, because the excitation is
 /// random or the period is wrong, all lines above a thousandth of the strongest amplitude count.

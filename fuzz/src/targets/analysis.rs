@@ -220,7 +220,7 @@ fn machine(d: &mut Draw, first: Measurement) -> Result<(), String> {
     used(d, &identified, &records[0])
 }
 
-/// Uses an identified machine for its modes and for a prediction.
+/// Computes the modes of an identified machine, and predicts the response of a record with it.
 fn used(d: &mut Draw, identified: &Identified, record: &Measurement) -> Result<(), String> {
     let Some(machine) = passed(identified.machine())? else { return Ok(()) };
     if let Some(modes) = passed(ModalSummary::from_machine(&machine))? {

@@ -218,7 +218,7 @@ fn responses(d: &mut Draw) -> Result<(), String> {
         passed(mean.push(&force, &response))?;
         passed(mean.frf(estimator))?;
     }
-    // The table comes from another program.
+    // The table has arbitrary numbers, because a table may come from another program.
     let omega = d.numbers(5);
     let tables: Vec<DMatrix<Complex<f64>>> =
         (0..d.dof(omega.len())).map(|_| d.matrix(dof, dof).map(|v| Complex::new(v, 1.0))).collect();

@@ -333,7 +333,7 @@ fn tables(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Returns the record of the example, cut into periods or open.
+/// Returns the example record `machine.csv` of the corpus, cut into periods or open.
 fn example(channels: &Channels, is_open: bool) -> Result<Measurement, String> {
     let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/records/machine.csv");
     let period = (!is_open).then_some(128);
@@ -342,7 +342,7 @@ fn example(channels: &Channels, is_open: bool) -> Result<Measurement, String> {
     opened.map_err(|error| error.to_string())
 }
 
-/// Reads a machine of named elements and fits it to the record of the example.
+/// Reads a machine of named elements and fits it to the example record.
 fn machine(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let path = folder.path().join("a.json");
@@ -367,7 +367,7 @@ fn machine(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Parses nonlinear terms and fits them to the record of the example.
+/// Parses nonlinear terms and fits them to the example record.
 fn terms(bytes: &[u8]) -> Result<(), String> {
     let Ok(terms) = String::from_utf8_lossy(bytes).parse::<Nonlinear>() else { return Ok(()) };
     reached(Depth::Read);

@@ -320,7 +320,7 @@ fn record(bytes: &[u8]) -> Result<(), String> {
     shown(&table.position(0).to_string())
 }
 
-/// Takes every column of a Parquet file as the identifiers of its records.
+/// Reads a Parquet file with each of its columns in turn as the identifiers of the records.
 fn identifiers(bytes: &[u8]) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let path = folder.path().join("a.parquet");

@@ -19,7 +19,7 @@ pub struct Comment {
     /// File and line.
     pub place: String,
     pub lines: Vec<String>,
-    /// Columns of the longest line; code of examples and tables do not count.
+    /// Width of the longest line, in columns; lines of example code and of tables do not count.
     pub width: usize,
 }
 

@@ -173,7 +173,8 @@ fn says(item: &Item, words: &[&str]) -> bool {
     let parts: Vec<&str> =
         text.split(|c: char| c.is_whitespace() || ",;:()[]`.".contains(c)).collect();
     let is = |part: &str, word: &str| match word.chars().all(char::is_lowercase) {
-        // A longer word may begin a sentence with a capital letter; a unit has one spelling only.
+        // A word of more than three letters may have a capital letter, as at the beginning of a
+        // sentence; a shorter word is a unit, whose spelling is fixed.
         true if word.len() > 3 => part.eq_ignore_ascii_case(word),
         _ => part == word,
     };
@@ -244,8 +245,8 @@ const PLAIN: usize = 2;
 /// expression: the code itself shows the formula.
 const FORMULA: usize = 4;
 
-/// Returns true if a function with numbers in its signature does more than pass on, compare,
-/// convert or select.
+/// Returns true if a function with numbers in its signature computes with them; to pass them on,
+/// compare, convert or select them does not count.
 fn computes(signature: &Signature, body: &Block) -> bool {
     let numbers = ["f64", "DVector", "DMatrix", "Complex", "Record", "Spectrum", "Response"];
     if !types(signature).iter().any(|ty| mentions(ty, &numbers)) || picks(signature) {

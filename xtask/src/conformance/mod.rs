@@ -22,7 +22,7 @@ use crate::thesis::results::Results;
 pub enum Status {
     /// The difference is within the tolerance.
     Met,
-    /// The printed number is wrong, with the reason for this conclusion.
+    /// The printed number is wrong; the text gives the reason for this conclusion.
     Misprint(String),
     /// The difference has no known reason.
     Open,
@@ -128,7 +128,7 @@ pub fn write(root: &Path, folder: Option<&Path>) -> Result<usize, String> {
     Ok(judges.iter().map(|judge| judge.rows.len()).sum())
 }
 
-/// Returns the first differences of the committed page from what is computed now.
+/// Returns the lines of the committed page that differ from the page computed now.
 ///
 /// # Errors
 /// The message of the computation or of the file that fails.

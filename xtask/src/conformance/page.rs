@@ -63,7 +63,8 @@ fn section(text: &mut String, judge: &Judge) {
     );
     for Row { quantity, expected, ours, difference_over_tolerance, status } in &judge.rows {
         let ratio = match difference_over_tolerance {
-            // A ratio that is only rounding has no sign.
+            // A ratio that rounds to zero is shown without a sign, because rounding may decide its
+            // sign.
             Some(ratio) if ratio.abs() < 0.005 => "0.00".to_owned(),
             Some(ratio) => format!("{ratio:.2}"),
             None => "–".to_owned(),

@@ -154,7 +154,8 @@ fn congruence(seed: u64, count: usize) -> Vec<f64> {
     (0..count).map(|_| next()).collect()
 }
 
-/// Returns the averaged frequency response of a recursive filter under noise.
+/// Returns the frequency response of a recursive filter, estimated by averages over segments; the
+/// input is noise, and more noise is added to the output.
 fn averaged() -> Result<Frf, String> {
     let force = congruence(12345, 2048);
     let noise = congruence(54321, 2048);

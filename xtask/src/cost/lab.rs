@@ -125,7 +125,8 @@ fn cases(folder: &Path) -> Result<Vec<Case>, String> {
     ])
 }
 
-/// Writes a random test of a chain, with 0.3 % noise on the force and 1 % on the displacements.
+/// Writes the record of a chain under random forces, with 0.3 % noise on the forces and 1 % noise
+/// on the displacements.
 fn shaken(path: &Path, dof: usize, driven: &[usize], samples: usize) -> Result<(), String> {
     let system = chain(dof, Support::Fixed, 0.02, 1);
     // The response to a whole period is computed exactly; the open record is a part of this period.

@@ -9,7 +9,7 @@ const BEGIN: &str = "# What it costs
 
 This page shows how the computation time grows with the number of degrees of freedom and of samples.
 `measure-cost`, a task of `cargo xtask`, writes this page and its figure; the times are those of the computer on which it ran last.
-Other computers have other times, but nearly the same slopes.
+On other computers the times differ, but the slopes of the curves are nearly the same.
 Each point is the shortest of several runs, because other programs can only lengthen a run.
 
 ![Time over degrees of freedom and over samples](cost.svg)
@@ -19,8 +19,8 @@ The exponent of n in the tables is fitted to the larger half of the sizes.
 ";
 
 const END: &str = "A dense step has two products of matrix and vector and one solution with the factors, n² operations each; its preparation is a factorisation, n³ operations.
-A step of a chain or a grid uses the non-zero entries of the matrices and of their factors: n of a chain, \
-n log n of a grid with minimum-degree ordering.
+A step of a chain or a grid uses the non-zero entries of the matrices and of their factors. Their number is \
+proportional to n for a chain, and to n log n for a grid with minimum-degree ordering.
 Least squares factors the rows once for all equations; maximum likelihood searches for the parameters of each equation \
 separately, and computes the common part of the equations once.
 For long records the time is proportional to the number of samples, apart from the constant cost of a run.

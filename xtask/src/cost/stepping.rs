@@ -9,8 +9,8 @@ use super::measure::{Growth, shortest};
 
 const DT: f64 = 1e-3;
 
-/// Measures the times of a step and of the preparation, with a force on one degree of freedom and
-/// the responses of two.
+/// Measures the time of a step and the time to prepare the scheme. The force acts on one degree of
+/// freedom; the responses of two degrees of freedom are kept.
 pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let dense: Vec<usize> = vec![2, 5, 10, 20, 50, 100, 200, 500];
     let chain = vec![100, 300, 1000, 3000, 10_000, 30_000, 100_000];

@@ -62,7 +62,7 @@ mod tests {
             "no two are alike"
         );
         for drawing in &drawings {
-            // The rasteriser parses the document: what it accepts is well-formed SVG.
+            // The rasteriser parses the document, so a document that it accepts is well-formed SVG.
             let bitmap = mechid::plot::svg_to_png(&drawing.svg, 0.5);
             assert!(bitmap.is_ok(), "{}: {bitmap:?}", drawing.number);
             assert!(

@@ -59,8 +59,8 @@ impl Spectra {
     }
 
     fn panel(self, reading: Reading, lines: &[ForceLines], dof: usize, name: &str) -> Panel {
-        // The error of the discretised equation is a factor, which needs a logarithmic axis. The
-        // error of the continuous equation is a fraction.
+        // The discretised equation can change the force by a large factor, so its axis is
+        // logarithmic. The continuous equation changes the force by a fraction only.
         let ordinate = match self.equation {
             Equation::Continuous => Axis::linear(name, "N"),
             Equation::Discretised => Axis::log10(name, "N"),

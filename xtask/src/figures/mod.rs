@@ -122,8 +122,8 @@ mod tests {
         }
     }
 
-    /// Compares the smallest and the largest |F̂/F| over all lines with a computation in another
-    /// language.
+    /// Checks the smallest and the largest |F̂/F| of the spectral lines: a separate program in
+    /// another programming language computed the same values.
     #[test]
     fn identified_forces_span_the_ranges_found_independently() {
         let ranges = [

@@ -13,10 +13,10 @@ pub const FALSE_ALARM: f64 = 0.001;
 /// Limits of the number of independent intervals that contain the true value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Smallest number of intervals with the true value that raises no alarm.
+    /// Smallest number of intervals containing the true value that raises no alarm.
     pub fewest: u64,
-    /// Largest number of intervals with the true value for which the intervals are not reported as
-    /// too wide.
+    /// Largest number of intervals that may contain the true value; with more, the intervals are
+    /// reported as too wide.
     pub most: u64,
 }
 
@@ -25,8 +25,9 @@ fn binomial(probability: f64, experiments: u64) -> Result<Binomial, String> {
 }
 
 impl Limits {
-    /// Computes the limits. With the stated coverage, the number is outside each limit with a
-    /// probability of at most [`FALSE_ALARM`].
+    /// Computes the limits. If the coverage is the stated one, the number of intervals that contain
+    /// the true value is below `fewest` with a probability of at most [`FALSE_ALARM`], and above
+    /// `most` with a probability of at most [`FALSE_ALARM`].
     ///
     /// # Errors
     /// A message if there are no experiments.
@@ -58,8 +59,9 @@ pub fn power(experiments: u64, loss: f64) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    /// Compares the limits and the power for twenty experiments with probabilities by hand: P(X ≤
-    /// 14) = 0.00033 and P(X ≤ 15) = 0.0026 for a coverage of 95 %.
+    /// Compares the limits and the power for twenty experiments with probabilities that were
+    /// calculated by hand. For a coverage of 95 %, P(X ≤ 14) = 0.00033 and P(X ≤ 15) = 0.0026, so
+    /// 15 is the smallest number without an alarm.
     #[test]
     fn limits_and_power_of_twenty_experiments() {
         let limits = Limits::new(20).unwrap();

@@ -91,8 +91,8 @@ pub fn short(seed: u64) -> Result<Vec<(Coverage, Vec<Interval>)>, String> {
     coverages(seed, true, |done, _| done >= SHORT)
 }
 
-/// Runs blocks of experiments of each kind until `is_enough` is true for their number and for the
-/// time of this kind.
+/// Runs experiments of each kind in blocks. A kind ends when `is_enough` returns true for its
+/// number of experiments and its running time.
 fn coverages(
     seed: u64,
     is_short: bool,

@@ -81,7 +81,8 @@ fn table_like(text: &str, table: &str) -> Option<std::ops::Range<usize>> {
     Some(start..start + rows.map(str::len).sum::<usize>())
 }
 
-/// Replaces the text between the marks of a name; a page without these marks is an error.
+/// Replaces the text between the two marks that contain `name`; a page without these marks is an
+/// error.
 fn rewrite(page: &Path, name: &str, content: &str) -> Result<(), String> {
     let words = |e: &dyn std::fmt::Display| format!("{}: {e}", page.display());
     let text = std::fs::read_to_string(page).map_err(|e| words(&e))?;

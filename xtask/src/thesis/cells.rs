@@ -71,8 +71,9 @@ fn row(cell: &Cell, results: &Results) -> Option<Row> {
     })
 }
 
-/// Judges a number. A listed misprint is accepted only if the corrected number is the computed one:
-/// for a cell its corrected digits, for a column the printed digits with the other sign.
+/// Judges a number. A listed misprint is accepted only if its correction agrees with the computed
+/// number. The correction of a cell is its corrected digits; that of a whole column is the opposite
+/// sign of the printed digits.
 fn judge(value: f64, printed: &str, misprint: Option<&'static Misprint>, reversed: f64) -> Judged {
     let plain = compare(value, printed);
     let (verdict, reason) = match misprint {
@@ -148,9 +149,9 @@ pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
         .collect()
 }
 
-/// Judges a mean. As for a cell, a listed misprint is accepted only if a mean of the column
-/// confirms the corrected number: of the printed errors, of the printed errors with their own
-/// misprints corrected, or of the computed errors.
+/// Judges a mean. As for a cell, a listed misprint is accepted only if one of three means of the
+/// column confirms the corrected number: the mean of the printed errors, the mean of these errors
+/// with their own misprints corrected, or the mean of the computed errors.
 fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMisprint>) -> Judged {
     let digits = |r: &&Row| r.error.printed.parse::<f64>().ok();
     let value = average(column.iter().filter_map(digits));

@@ -101,8 +101,9 @@ pub fn time(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::Euler)
 }
 
-/// Our best estimator on one noise-free period with a known force: exact for a force that is linear
-/// between samples. The remaining error is the integrator's.
+/// Our best estimator for one noise-free period with a known force. It is exact for a force that is
+/// linear between samples, so any error of the estimates comes from the integrator of the
+/// simulation.
 pub fn best(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::FirstOrderHold)
 }

@@ -147,8 +147,8 @@ fn estimate(key: Key) -> Result<Estimates, String> {
     })
 }
 
-/// Returns the printed estimate of a key with the slips of the original programs, all of them or
-/// all but one.
+/// Recomputes the printed estimate of a key with the slips of the original programs: with all
+/// slips, or with all except `undone`.
 fn replay(key: Key, undone: Option<Slip>) -> Listed {
     let sequences = slipped_but(key.case(), key.method, undone)?;
     let offset = undone != Some(Slip::HarmonicOffset);

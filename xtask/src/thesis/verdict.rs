@@ -52,8 +52,8 @@ impl Decimal {
 pub fn compare(value: f64, printed: &str) -> Verdict {
     let Some(decimal) = Decimal::parse(printed) else { return Verdict::Unexplained };
     let scaled = value * 10f64.powi(decimal.places as i32);
-    // A value that equals the printed decimal up to its last bit must not be truncated to the
-    // decimal below.
+    // A value that is below the printed number only by rounding of its last bit must not be
+    // truncated to the next smaller decimal.
     let slack = 1e-9 * scaled.abs().max(1.0);
     let truncated = (scaled.trunc(), (scaled + scaled.signum() * slack).trunc());
     let printed = decimal.units as f64;

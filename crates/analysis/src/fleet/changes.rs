@@ -158,8 +158,8 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Returns medians of five neighbours, minus their mean: they keep the position of a step and
-/// remove one or two outliers.
+/// Returns, for each value, the median of five neighbours, minus the mean of all these medians. The
+/// medians keep the position of a step and remove one or two outliers.
 fn running_medians(values: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
     let of_five =

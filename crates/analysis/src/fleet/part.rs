@@ -182,8 +182,8 @@ impl Part {
         Ok(done)
     }
 
-    /// Returns the summary in the existing file; `None` if there is no file, or if it is not a part
-    /// of a fleet.
+    /// Returns the summary of a part that an earlier run wrote into this file; `None` if there is
+    /// no file, or if the file does not contain such a summary.
     fn done(&self, path: &Path) -> Option<PartDone> {
         let pairs = read_parquet_metadata(path).ok()?;
         let (_, done) = pairs.iter().find(|(key, _)| key == DONE)?;

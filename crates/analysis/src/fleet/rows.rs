@@ -1,4 +1,4 @@
-//! Rows of the records of a file, one after the other.
+//! Identification of the records of one file, one after the other, and their rows of results.
 
 use std::path::Path;
 

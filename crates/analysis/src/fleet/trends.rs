@@ -241,7 +241,8 @@ impl TrendSeries {
             })
     }
 
-    /// Returns the number of values without an interval; 0 for a series of known values.
+    /// Returns the number of values without an interval; 0 if no value of the series has a standard
+    /// error.
     fn without_interval(&self) -> usize {
         let with = self.points.iter().filter(|point| point.interval.is_some()).count();
         if self.standard_error.is_none() { 0 } else { self.points.len() - with }
@@ -335,8 +336,8 @@ struct Quantity {
 /// Returns the parameters and modes of a row.
 ///
 /// The intervals have the degrees of freedom of the covariance of the parameters. A modal test has
-/// no parameters, and normal intervals. Parameters without a covariance have no intervals, because
-/// their degrees of freedom are unknown.
+/// no parameters, and its intervals follow from the normal distribution. Parameters without a
+/// covariance have no intervals, because their degrees of freedom are unknown.
 fn quantities(row: &ResultRow) -> Vec<Quantity> {
     let degrees_of_freedom = row.covariance.as_ref().map(|c| c.degrees_of_freedom);
     let quantity = |name: String, unit: &str, value: f64, standard_error: Option<f64>| {

@@ -218,8 +218,8 @@ impl Worker {
         {
             use std::os::unix::process::CommandExt as _;
 
-            // Ctrl-C ends the fleet, not a single process: otherwise the record of that process
-            // would appear as a failure.
+            // The process gets its own process group, so that Ctrl-C ends only the fleet: if Ctrl-C
+            // also ended this process, its record would appear as a failure.
             command.process_group(0);
         }
         let mut child = command.spawn().map_err(failed)?;

@@ -225,7 +225,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// Returns the usual symbol.
+    /// Returns the usual symbol of the estimator, such as `H1`.
     pub fn name(self) -> &'static str {
         match self {
             Estimator::H1 => "H1",
@@ -465,7 +465,7 @@ impl Responses {
         let idle = (!listed.is_empty()).then(|| {
             format!(
                 "{of_record}only noise in {forces} {}: the signal is weak, and not coherent with the other forces \
-                 and the response, so it has no frequency responses",
+                 and the response, so no frequency responses are computed from it",
                 listed.join(", ")
             )
         });

@@ -52,7 +52,7 @@ pub struct FrfTable {
     pub unit: &'static str,
     /// Names of the responses.
     pub response_names: Vec<String>,
-    /// Names of the forces; there may be more or fewer than responses.
+    /// Names of the forces; the number of forces may differ from the number of responses.
     pub force_names: Vec<String>,
     /// Frequencies, in Hz, one per value of a response.
     pub frequency_hz: Vec<f64>,

@@ -101,8 +101,9 @@ impl Acquisition {
         Ok(data)
     }
 
-    /// Returns a fit with the given assumption on the force between samples `dt` (s) apart, and the
-    /// records with the band-limited force that causes the same response.
+    /// Fits the records again with the assumption `between_samples` on the force between its
+    /// samples, which are `dt` (s) apart. Returns the fit, and the records in which each force is
+    /// replaced by the equivalent force: the band-limited force that causes the same response.
     ///
     /// # Source
     /// Successive substitution: the equivalent force depends on the system only through the
@@ -144,8 +145,8 @@ impl Acquisition {
             change = largest_change(&last.0.estimate, &fit.estimate);
             last = (fit, equivalent);
             // The first round with the final noise model may change the estimate much, although the
-            // next change is small. The next change is predicted as this change times `decrease`,
-            // the ratio of the two changes before it.
+            // next change is small. The next change is predicted as the change in this round times
+            // `decrease`, the ratio of the changes in the two rounds before this round.
             if settled && change * f64::min(decrease, 1.0) < ACQUISITION_SETTLED {
                 break;
             }
@@ -160,10 +161,12 @@ impl Acquisition {
 pub(super) struct BetweenSamples {
     kind: Discretisation,
     fit: OutputErrorFit,
-    /// Ratio of the residual power with this force to that of the fit with a band-limited force:
-    /// the geometric mean over the channels, as in the likelihood of white noise.
+    /// Ratio of two residual powers, that of the fit with a held or linear force and that of the
+    /// fit with a band-limited force: the geometric mean over the channels, as in the likelihood of
+    /// white noise.
     pub(super) remaining: f64,
-    /// `true` if this force reduces the residual power and no test of the residual warns.
+    /// `true` if the fit with a held or linear force has less residual power than the fit with a
+    /// band-limited force, and no test of its residual warns.
     pub(super) leaves_noise: bool,
 }
 
@@ -218,13 +221,13 @@ impl<'a> BandLimitedFit<'a> {
         Some(Self { records, fit, level, unknowns, pooling })
     }
 
-    /// Returns the best of the fits with the `kinds` of force between samples, `dt` (s) apart; each
-    /// kind replaces the band-limited force. If the residual of one kind is only noise, another
-    /// kind is fitted only if it reduces the residual power for the same noise. `None` without
-    /// kinds, or if no fit succeeds.
+    /// Fits the records with each of the `kinds` of force between samples, `dt` (s) apart, in place
+    /// of the band-limited force, and returns the best fit. If the residual of the best fit so far
+    /// is only noise, another kind is fitted only if it reduces the residual power under the
+    /// assumption of white noise. `None` without kinds, or if no fit succeeds.
     ///
     /// # Source
-    /// Maximum likelihood with the levels of the channels eliminated.
+    /// Maximum likelihood after elimination of the noise levels of the channels.
     pub(super) fn between_samples(
         &self,
         kinds: &[Discretisation],
@@ -242,7 +245,8 @@ impl<'a> BandLimitedFit<'a> {
     }
 
     /// Returns whether one kind of force leaves less residual power than the best kind so far. The
-    /// searches begin at the fit with this best kind and at the band-limited fit.
+    /// power of this kind is minimised from two initial estimates: the fit with the best kind so
+    /// far, and the band-limited fit.
     fn leaves_less(&self, kind: Discretisation, best: &BetweenSamples, dt: f64) -> bool {
         let log_power = |kind: Discretisation, near: &OutputErrorFit| {
             let data = joined(&self.equivalent(near, kind, dt)?).ok()?;
@@ -338,7 +342,7 @@ fn residual_powers(record: &FrequencyData, system: &SecondOrderSystem) -> DVecto
     powers
 }
 
-/// Largest change of a parameter, in standard errors.
+/// Returns the largest change of a parameter between two estimates, in standard errors.
 fn largest_change(before: &Estimate, after: &Estimate) -> f64 {
     let pairs = before.parameters().zip(after.parameters());
     pairs.map(|(a, b)| (a.value - b.value).abs() / b.standard_error).fold(0.0, f64::max)

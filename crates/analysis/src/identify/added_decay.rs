@@ -78,7 +78,8 @@ pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, Analy
         };
         match (damping, mass) {
             (Some(_), None) => return mixed(Matrix::Damping, Matrix::Mass),
-            // A proportional damping is determined by the entries of M and K.
+            // The entries of a proportional damping follow from the entries of M and K, and are not
+            // fixed here.
             (Some(damping), Some(mass)) if !unknowns.has_proportional_damping() => {
                 let value = damping + 2.0 * rate * mass;
                 windowed = windowed.fix(Matrix::Damping, row, column, value)?;

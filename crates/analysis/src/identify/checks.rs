@@ -224,7 +224,7 @@ pub(crate) fn sentence(finding: &Finding, names: &Channels) -> String {
     finding.sentence(&name).to_string()
 }
 
-/// Serialises a value as its display.
+/// Serialises a value as the text that its `Display` writes.
 fn as_text<T: std::fmt::Display, S: serde::Serializer>(
     value: &T,
     serializer: S,

@@ -20,8 +20,8 @@ pub(super) struct Compared {
 
 impl Compared {
     /// Compares a fit with fits to parts of its data. If `records` is given, it also compares the
-    /// fit with larger models; `records` describes the samples of the rows and is empty if the
-    /// samples are not known.
+    /// fit with larger models; `records` states which rows of the data belong to which record, and
+    /// the sampling of this record. It is empty if the sampling is not known.
     pub(super) fn new(
         fit: &PartsOfFit<'_>,
         splits: &[(Split, RowParts)],

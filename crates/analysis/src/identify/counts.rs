@@ -85,7 +85,7 @@ pub(super) fn check_tables(
     let functions = tables.iter().flat_map(|table| &table.functions).filter(is_chosen);
     let points = functions.flat_map(|function| [&function.response, &function.reference]);
     let dof = points.map(|point| point.replace('-', "+")).collect::<BTreeSet<_>>().len();
-    // Impossible settings are refused later.
+    // Impossible settings count as no unknowns here; a later step refuses them.
     let unknowns = how.mass.unknowns(dof).and_then(|all| how.structure.apply(all));
     let unknowns = unknowns.map_or(0, |unknowns| unknowns.independent());
     let sensitivities = numbers.saturating_mul(unknowns).saturating_mul(TABLE_SENSITIVITY_BYTES);

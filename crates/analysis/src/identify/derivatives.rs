@@ -88,7 +88,7 @@ impl Prepared {
         })
     }
 
-    /// Returns these samples followed by the first sample of `others`.
+    /// Returns these samples, extended by one sample: the first sample of `others`.
     pub fn followed_by(&self, others: &Self) -> Result<Self, AnalysisError> {
         let join = |own: &Record, other: &Record| joined(own, &other.window(0, 1)?);
         let pair = self.acceleration.as_ref().zip(others.acceleration.as_ref());

@@ -20,9 +20,9 @@ const NAMED: usize = 6;
 /// If a fault of the channels or another model explains the failure, only a singular fit is
 /// refused. If all intervals contain zero, the modes of a system with several degrees of freedom
 /// may still be determined: the fit is accepted if a natural frequency is determined. With one
-/// degree of freedom, response and mode are then indistinguishable from noise. A biased estimate is
-/// accepted although it explains too little: most of the response may be signal, and the bias the
-/// cause.
+/// degree of freedom, the fit is refused even then, because response and mode are indistinguishable
+/// from noise. A biased estimate is accepted even if it explains no more than chance does: the
+/// response may be mostly signal that the estimate does not explain because of its bias.
 ///
 /// # Errors
 /// [`AnalysisError::NothingDetermined`].

@@ -61,9 +61,9 @@ pub(super) struct Disagreement {
     /// Mean square error that omitted terms add to the covariance of the parameters, in the product
     /// of the units of two parameters (parameters × parameters).
     omitted: Option<DMatrix<f64>>,
-    /// Square of the change of the parameters by another model that explains the residual (a delay,
-    /// a fault of the acquisition, another quantity), in the product of the units of two
-    /// parameters.
+    /// Vector of the parameter changes times its transpose (parameters × parameters), in the
+    /// product of the units of two parameters. The changes are due to another model that explains
+    /// the residual (a delay, a fault of the acquisition, another quantity).
     explained: Option<DMatrix<f64>>,
     /// Scale of the standard errors; `None` if they follow from the noise alone.
     scale: Option<ErrorScale>,
@@ -92,7 +92,7 @@ impl Disagreement {
         }
     }
 
-    /// Returns the additions without a scale, for standard errors that follow from the residual.
+    /// Removes the scale, because standard errors that follow from the residual need no scale.
     pub(super) fn without_scale(self) -> Self {
         Self { scale: None, ..self }
     }
@@ -150,8 +150,8 @@ impl Disagreement {
     }
 }
 
-/// Returns the square of the change from one estimate to another, in the product of the units of
-/// two parameters.
+/// Returns the vector of the parameter changes from one estimate to another times its transpose
+/// (parameters × parameters), in the product of the units of two parameters.
 pub(super) fn outer_product_of_change(from: &Estimate, to: &Estimate) -> DMatrix<f64> {
     let pairs = from.parameters().zip(to.parameters());
     let change: Vec<f64> = pairs.map(|(from, to)| to.value - from.value).collect();

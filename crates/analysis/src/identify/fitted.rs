@@ -31,8 +31,8 @@ pub struct Fitted {
     pub domain: Domain,
     /// Name of the estimator.
     pub estimator: &'static str,
-    /// `true` for least squares: the checks after the fit may then show its bias instead of a
-    /// fault.
+    /// `true` for least squares: the checks after the fit may then warn because of the bias of
+    /// least squares, without a fault of the data.
     pub least_squares: bool,
     /// Estimate with its uncertainty; for a fit with nonlinear terms, the estimate of the linear
     /// part. If the equations have no scale, it is the estimate of one of the systems with the same
@@ -72,9 +72,9 @@ pub struct Fitted {
     pub force_noise: Vec<ForceNoise>,
     /// Sinusoids that were subtracted from open records.
     pub sinusoids: Vec<SinusoidRow>,
-    /// Measured responses to draw; `None` if these are the fitted responses. For open records they
-    /// are the responses to the forces without the transients, for segments the averages without a
-    /// correction.
+    /// Measured responses to draw; `None` if the responses that were fitted are drawn. For open
+    /// records, they are the responses to the forces, without the transients; for segments, they
+    /// are the averages before the bias of the window is subtracted.
     pub drawn: Option<FrequencyData>,
     /// Remarks on the fit.
     pub remarks: Vec<String>,
@@ -244,7 +244,8 @@ impl Fitted {
         })
     }
 
-    /// Returns the identified system with its nonlinear terms, if it has any.
+    /// Returns the identified system with its nonlinear terms and its uncertainty; `None` for a
+    /// linear system.
     ///
     /// # Errors
     /// As [`Fitted::model`].
@@ -262,15 +263,16 @@ impl Fitted {
         (residuals.iter().map(|e| e * e).sum::<f64>() / residuals.len() as f64).sqrt()
     }
 
-    /// Returns whether the fit is of the response, weighted by its noise, and not of the force.
+    /// Returns whether the fit minimises the residual of the response, weighted by the noise of the
+    /// response, instead of the residual of the force.
     pub(crate) fn fits_response(&self) -> bool {
         let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
         !self.noise.is_empty() || (noise_stated && !self.least_squares)
     }
 
-    /// Returns the RMS of measured minus modelled response over the RMS of the measured response,
-    /// on the lines used: in the measured quantity or, if the fit was weighted, in units of the
-    /// noise.
+    /// Returns the ratio of two RMS values on the lines used: that of the measured minus the
+    /// modelled response, and that of the measured response. Both are in the measured quantity or,
+    /// if the fit was weighted, in units of the standard deviation of the noise.
     ///
     /// # Errors
     /// [`AnalysisError::Model`] if the model has no receptance at a line.
@@ -300,7 +302,8 @@ pub(super) fn unexplained_motion(
     for (row, omega) in data.omega().iter().enumerate() {
         let measured = data.displacement().row(row).transpose();
         let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
-        // Displacements would give the lines at low frequencies too much weight.
+        // The responses are compared in the measured quantity: as displacements, the lines at low
+        // frequencies would have too much weight.
         let quantity = data.measured().per_displacement(*omega).norm_sqr();
         for channel in 0..data.dof() {
             let weight = match data.noise() {

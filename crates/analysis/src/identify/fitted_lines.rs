@@ -24,13 +24,15 @@ pub struct FittedLine {
     /// quantity; for segments, the bias of the window is subtracted.
     pub measured: Vec<[f64; 2]>,
     /// Standard error of each measured response, √(E|ΔX|²/2), equal for real and imaginary part, in
-    /// its unit; `None` if the noise is unknown.
+    /// the unit of the response; `None` if the noise is unknown.
     pub measured_standard_error: Option<Vec<f64>>,
-    /// Response of the identified system to the force, of each degree of freedom, in the same unit.
+    /// Response of each degree of freedom of the identified system to the force, in the unit of the
+    /// measured response.
     pub fitted: Vec<[f64; 2]>,
-    /// Standard error of each fitted response, propagated from the parameters, in its unit.
+    /// Standard error of each fitted response, propagated from the parameters, in the unit of the
+    /// response.
     pub fitted_standard_error: Vec<f64>,
-    /// Measured minus fitted response of each degree of freedom, in the same unit.
+    /// Measured minus fitted response of each degree of freedom, in the unit of the response.
     pub residual: Vec<[f64; 2]>,
 }
 

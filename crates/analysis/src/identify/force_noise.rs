@@ -148,7 +148,7 @@ impl ForceNoise {
             Some(ForceNoiseSource::Stated) => "as stated",
             Some(ForceNoiseSource::BetweenHits) => "estimated between the hits",
             Some(ForceNoiseSource::Residual) => {
-                "estimated from the residual, which shows less than the level above the excited band"
+                "estimated from the residual, which shows less noise than the lines above the excited band"
             }
             Some(ForceNoiseSource::AboveBand) | None => "estimated above the excited band",
         };
@@ -158,7 +158,7 @@ impl ForceNoise {
             return match source {
                 Some(ForceNoiseSource::Stated) => "the force was assumed exact, as stated".into(),
                 Some(ForceNoiseSource::Residual) => {
-                    "the force was assumed exact: the residual of the fit shows that its noise is less than the level above the excited band"
+                    "the force was assumed exact: the residual of the fit shows that the noise of the force is less than the level above the excited band"
                         .into()
                 }
                 _ => "the force shows no noise and was assumed exact".into(),

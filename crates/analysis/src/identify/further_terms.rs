@@ -72,7 +72,8 @@ impl FurtherTerms {
 
     /// Compares a fit with a larger fit, whose last terms are the further terms; `None` if the
     /// larger fit has no further terms. `p_value` is the probability that noise alone gives a
-    /// further term at least as significant.
+    /// further term at least as significant as the most significant of these terms (for open
+    /// records: as the first of these terms).
     fn new(
         fit: &NonlinearEstimate,
         larger: &NonlinearEstimate,

@@ -122,7 +122,8 @@ pub enum Domain {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constant {
-    /// Constants inside the laws, starting from the given values.
+    /// Constants inside the laws of the nonlinear terms; the search begins at the values that the
+    /// laws state.
     Laws,
     /// Delay of the force.
     Delay,

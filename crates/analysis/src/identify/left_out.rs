@@ -37,7 +37,8 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Creates the disturbance of a rotation at this frequency (Hz) and its multiples.
+    /// Returns a disturbance at the frequency of a rotation (Hz) and at the multiples of this
+    /// frequency.
     pub fn rotation(frequency_hz: f64) -> Self {
         Self { frequency_hz, half_width_hz: None, multiples: true }
     }
@@ -130,8 +131,8 @@ impl LeftOut {
     }
 }
 
-/// Returns the lines of the fit, including lines without force, on which the nonlinear forces must
-/// balance the linear forces of the response.
+/// Returns the lines of a fit with nonlinear terms. Lines without force are included: on these
+/// lines the nonlinear forces must balance the forces of mass, damping and stiffness.
 pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
     let driven = rule.lines(&held.force, held.period)?;

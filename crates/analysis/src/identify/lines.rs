@@ -19,14 +19,14 @@ pub enum LineChoice {
     Driven,
     /// Driven lines within a frequency band.
     Band(Band),
-    /// Given lines, whether or not the force drives them.
+    /// Lines that the settings give by number, including lines that the force does not drive.
     Lines(LineSpec),
 }
 
 impl FromStr for LineChoice {
     type Err = String;
 
-    /// Reads lines as [`LineSpec`] does.
+    /// Reads the numbers of spectral lines, written as for [`LineSpec`].
     fn from_str(text: &str) -> Result<Self, String> {
         text.parse().map(Self::Lines).map_err(|error: mechid_io::IoError| error.to_string())
     }

@@ -192,7 +192,8 @@ fn degrees_of_freedom(records: &[Windowed]) -> Result<usize, AnalysisError> {
     Ok(dofs)
 }
 
-/// Returns the failure of a fit with the surplus of resonances as a reason.
+/// Returns the failure of a fit. If `surplus` reports more modes in the data than responses, it is
+/// added as a reason.
 fn with_surplus(failure: AnalysisError, surplus: Option<String>) -> AnalysisError {
     match (failure, surplus) {
         (AnalysisError::Unfit { error, reasons }, Some(surplus)) => {
@@ -384,7 +385,7 @@ impl Identified {
         self.fitted.nonlinear.as_ref().map(|fitted| &fitted.estimate)
     }
 
-    /// Returns the identified system with its nonlinear terms, if it has any.
+    /// Returns the identified system; if it has nonlinear terms, they are included.
     ///
     /// # Errors
     /// As [`Identified::system`].
@@ -403,8 +404,8 @@ impl Identified {
         Ok(self.fitted.estimate.system()?)
     }
 
-    /// Returns the covariance of the estimated parameters for any number of them, including those
-    /// of nonlinear terms.
+    /// Returns the covariance of the estimated parameters, including those of nonlinear terms. The
+    /// summary omits it if there are many parameters; this function always returns it.
     pub fn covariance(&self) -> ParameterCovariance {
         summary::covariance(&self.fitted, self.summary.unscaled.as_ref())
     }

@@ -38,7 +38,7 @@ const HELD_OUT_RECORDS: usize = 3;
 pub struct NonlinearSummary {
     /// Terms as they are written, with the estimated constants inside them.
     pub terms: Terms,
-    /// Coefficients, one for each term, in its unit.
+    /// Coefficients, one for each term, each in the unit that the law of the term requires.
     pub coefficients: Vec<f64>,
     /// Delay and phase of the channels; zero unless they were searched for.
     pub channels: ChannelPhase,
@@ -109,7 +109,8 @@ impl ExtrapolationRow {
 /// One parameter that is not an entry of M, C or K.
 #[derive(Debug, Serialize)]
 pub struct TermRow {
-    /// Name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or `p5`.
+    /// Name of a term, of a constant inside a term (`c3.b` for the constant b of the term `c3`), or
+    /// `delay`, `p3` or `p5`.
     pub name: String,
     /// SI unit.
     pub unit: String,
@@ -124,9 +125,9 @@ pub struct TermRow {
 /// Levels of distortion, and the kind of term that explains most of the residual of a linear model.
 #[derive(Debug, Serialize)]
 pub struct DistortionRow {
-    /// Level on even lines; `None` if even lines are driven.
+    /// Level of the distortion on even lines; `None` if even lines are driven.
     pub even: Option<Level>,
-    /// Level on odd lines without excitation.
+    /// Level of the distortion on odd lines without excitation.
     pub odd: Option<Level>,
     /// Part of the force that a linear model does not explain, on the lines of the fit (pure
     /// number).
@@ -399,8 +400,8 @@ impl NonlinearSummary {
         })
     }
 
-    /// Returns the findings before the fit and the amplitudes of the data within which the terms
-    /// are valid, a sentence each.
+    /// Returns the finding before the fit, the selection of terms and, for each term, the largest
+    /// amplitudes in the data; a prediction for larger amplitudes extrapolates the term.
     pub fn text(&self) -> String {
         let before = self.distortion.as_ref();
         let mut text =

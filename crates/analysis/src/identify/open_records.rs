@@ -134,9 +134,10 @@ impl OpenSpectra {
         Ok(Self { data, lines, force_noise: of_force })
     }
 
-    /// Reduces the noise of the forces, if it was estimated above the driven band, as long as the
-    /// residual of the fit shows that it is less, for example because the force has a signal above
-    /// the band. The machine is fitted again after each reduction. Returns the last fit.
+    /// Reduces the noise level of the forces if it was estimated above the driven band in every
+    /// record. This estimate is too high if, for example, a force has a signal above the band. The
+    /// reductions end when the residual of the fit no longer shows a lower noise level. The machine
+    /// is fitted again after each reduction. Returns the last fit.
     fn with_likely_force_noise(
         &mut self,
         mut fit: OutputErrorFit,
@@ -157,7 +158,8 @@ impl OpenSpectra {
             else {
                 break;
             };
-            // The noise of a fit that the time limit ended may be incomplete.
+            // If the time limit ended the fit, its noise estimate may be incomplete; the previous
+            // fit is returned.
             if time_limit::is_over() {
                 break;
             }
@@ -210,8 +212,7 @@ pub(super) fn fit(
             || agreement(&data, &fit, &residuals, excitation),
         )
     });
-    let better_explanation = better_explanation?;
-    let (better_explanation, explained) = better_explanation.unzip();
+    let (better_explanation, explained) = better_explanation?.unzip();
     let names_quantity = better_explanation.as_ref().is_some_and(is_of_quantity);
     let Compared { parts, omitted } =
         compared?.without_unlikely_term(better_explanation.as_ref().map(remaining));
@@ -304,8 +305,8 @@ struct Tested<'a> {
     residuals: &'a [SpectralResidual],
 }
 
-/// Cause of a residual, and the vector of the parameter changes by this cause times its transpose
-/// (parameters × parameters), in the product of the units of two parameters.
+/// Cause of a residual, and the outer product Δ Δᵀ of the vector Δ of the parameter changes by this
+/// cause (parameters × parameters), in the product of the units of two parameters.
 type CauseWithChange = (Finding, Option<DMatrix<f64>>);
 
 /// Function that returns a record with changed channels.
@@ -313,8 +314,8 @@ type RecordChange = Box<dyn Fn(&FrequencyData) -> FrequencyData>;
 
 impl Tested<'_> {
     /// Finds another quantity of the responses, a delay, or a fault of the acquisition that
-    /// explains the residual. Also returns the vector of the parameter changes by this cause times
-    /// its transpose; `None` in its place if a fit fails.
+    /// explains the residual. Also returns the outer product Δ Δᵀ of the vector Δ of the parameter
+    /// changes by this cause, or `None` if a fit fails.
     fn cause(
         &self,
         dt: f64,
@@ -416,8 +417,9 @@ impl Tested<'_> {
         let leaves_less = |fault: &Finding| {
             between.as_ref().is_none_or(|b| !b.leaves_noise || remaining(fault) < b.remaining)
         };
-        // The fit may be at a wrong minimum, so a new search is needed for each of the two possible
-        // causes: the force between samples (above) and AC coupling.
+        // The fit may be at a wrong minimum, so each of the two possible causes needs a new search.
+        // `compared.between_samples` made this search for the force between samples; this closure
+        // makes it for AC coupling.
         let again = |finding: Finding| {
             let change = without_cause(&finding, closed[0].measured());
             match change.and_then(|change| compared.after(change)) {
@@ -442,7 +444,8 @@ fn better_explanation(one: Option<Explanation>, other: Option<Explanation>) -> O
     one.into_iter().chain(other).min_by(|a, b| power(a).total_cmp(&power(b)))
 }
 
-/// Returns the fraction of the residual power that remains with the explanation of a finding.
+/// Returns the fraction of the residual power that remains if the model includes the cause that a
+/// finding names; 1 if the finding is neither a delay nor an alternative model.
 pub(super) fn remaining(finding: &Finding) -> f64 {
     match finding {
         Finding::Delay(delay) => delay.remaining,
@@ -472,9 +475,10 @@ fn between_samples(finding: &Finding) -> Option<Discretisation> {
     }
 }
 
-/// Returns a function that removes a delay, or AC coupling, from a record with responses of the
-/// given `quantity`. For a delay, the function also delays the force; for AC coupling, it gives all
-/// channels the same AC coupling. `None` if the finding is neither of these two.
+/// Returns a function that removes the effect of a delay or of AC coupling from a record with
+/// responses of the given `quantity`. If the responses are delayed, the function delays the forces
+/// by the same time. If some channels are AC coupled, it gives all channels the same AC coupling.
+/// `None` if the finding is neither of these two.
 fn without_cause(finding: &Finding, quantity: ResponseQuantity) -> Option<RecordChange> {
     let cause = match finding {
         Finding::Delay(delay) => &Cause::Delay { seconds: delay.seconds },
@@ -595,8 +599,9 @@ fn show(ends: &EndLoads) -> bool {
     ends.p_value() < LEVEL && ends.share > ROUNDING
 }
 
-/// Returns all lines between the first and the last one chosen by the rule, because transients
-/// appear as differences between neighbouring lines.
+/// Returns the lines to fit. Unless single lines are given, these are all lines from the first to
+/// the last line that the rule chooses, because transients appear as differences between
+/// neighbouring lines.
 fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let chosen = rule.lines(&held.force, held.force.len())?;
     let (Some(&first), Some(&last)) = (chosen.first(), chosen.last()) else { return Ok(chosen) };

@@ -120,7 +120,7 @@ pub struct OpenFit {
 /// Noise of open records.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OpenNoise {
-    /// Spectrum of the noise on the response, from the residual.
+    /// Form of the noise spectrum of the response; the noise is estimated from the residual.
     pub response: Pooling,
     /// Standard deviation of the white noise on the samples of the force, in N: one level for all
     /// forces, or one for each degree of freedom. `None`: estimated above the band that the force

@@ -52,9 +52,10 @@ pub(super) fn better_model_of(
     better_model_on(tables, how, data, result)
 }
 
-/// Returns the failure of a search. If the responses of another quantity, or of levels in dB, are
-/// explained far better than those of the tables by least squares, this is added as a reason. The
-/// models are fitted to fewer lines if the tables have many.
+/// Returns the failure of a search. Adds a reason if the values of the tables seem to be responses
+/// of another quantity, or levels in dB: a fit to these responses must explain them far better than
+/// least squares explains the responses as stated. If the tables have many lines, only some of the
+/// lines are fitted.
 pub(super) fn with_better_model(
     failure: AnalysisError,
     tables: &[FrequencyResponses],
@@ -124,7 +125,8 @@ struct Other {
     cause: Cause,
     /// Fraction of the residual power that remains with this model.
     remaining: f64,
-    /// Estimate with this model; `None` if the parameters have another meaning, or for a delay.
+    /// Estimate with this model. `None` for structural damping, whose parameters have another
+    /// meaning, and for a delay, which `better_model_on` fits again.
     estimate: Option<Estimate>,
 }
 
@@ -235,8 +237,8 @@ fn delayed(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, Estimate)>
     Some((seconds, fit))
 }
 
-/// Returns a fit to the tables with their values taken as responses of `quantity`, and the measured
-/// and fitted responses.
+/// Returns a fit to the tables in which every value counts as a response of `quantity`. Also
+/// returns the measured and the fitted responses.
 fn refitted(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -256,8 +258,8 @@ fn refitted(
     Some((fit.estimate, model))
 }
 
-/// Returns a fit to the tables with their magnitudes taken as levels in dB, and the measured and
-/// fitted responses. The mean level of the first function has the given `sign`.
+/// Returns a fit to the tables in which every magnitude counts as a level in dB. Also returns the
+/// measured and the fitted responses. The mean level of the first function has the given `sign`.
 fn level_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
@@ -302,10 +304,10 @@ fn magnitude(z: Complex<f64>, level: f64) -> Complex<f64> {
     Complex::from_polar((level / DECIBELS).exp(), z.arg() + turn)
 }
 
-/// Returns the levels in dB of values whose magnitudes are absolute levels; the sign of the first
-/// level is unknown and taken as positive. On each further line, the level keeps or reverses the
-/// sign of the previous level: the result is the sign with the smaller change of the logarithm of
-/// the response. A negative level appears in the data as a phase shift of π.
+/// Returns levels in dB, with their signs. The magnitudes of `values` are the absolute values of
+/// these levels; a negative level appears as a phase shift of π. The sign of the first level is
+/// unknown and taken as positive. Each further level gets the sign with which the logarithm of the
+/// response changes less from the previous line.
 fn levels(values: &[Complex<f64>]) -> Vec<f64> {
     let mut sign = 1.0;
     let mut levels: Vec<f64> = values.iter().map(|z| z.norm()).collect();

@@ -166,7 +166,8 @@ pub(crate) fn shown(
 /// Returns displacement and velocity at the first sample of a period of a response.
 fn periodic_start(motion: &Record, kind: ResponseQuantity) -> Result<InitialState, EstimateError> {
     let spectrum = Spectrum::from_record(motion);
-    // The highest line of an even number of samples has no derivative.
+    // The highest line (half the sampling rate) of an even number of samples is excluded, because
+    // it has no derivative.
     let lines = motion.len().div_ceil(2);
     let first = usize::from(kind != ResponseQuantity::Displacement);
     let at_zero = |order: i32| {

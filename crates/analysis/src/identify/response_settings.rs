@@ -14,7 +14,7 @@ use super::structure::Structure;
 pub struct IdentifyResponses {
     /// Measured quantity of the responses; `None`: as the table states it.
     pub quantity: Option<ResponseQuantity>,
-    /// Number of independent averages behind the coherence, a pure number.
+    /// Number of independent averages in the coherence, a pure number.
     pub averages: Option<f64>,
     /// Points of the responses, one per degree of freedom; empty: all, in the order of the table.
     pub points: Vec<String>,

@@ -30,8 +30,8 @@ use crate::hits;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
-/// Minimum change of a parameter, in standard errors, for a remark on the correction of the window
-/// bias that caused the change.
+/// Change of a parameter by the correction of the window bias, in standard errors, above which a
+/// remark reports this change.
 const NOTED_WINDOW_CORRECTION: f64 = 0.5;
 
 /// Remark on records that are not whole periods, and that are too long to be fitted as open records
@@ -40,9 +40,9 @@ pub(super) const UNTRIED: &str = "the windows are not whole periods, and have to
                                   the transients by default: frequency responses were averaged over segments. \
                                   `extent` open estimates the transients";
 
-/// Returns whether averages over segments suit the records better than whole windows do: a window
-/// is not a whole period, the force is not a series of hits, and no lines were chosen by their
-/// numbers, which refer to whole windows.
+/// Returns whether averages over segments suit the records better than whole windows: true if a
+/// window does not consist of whole periods, the force is not a series of hits, and no lines are
+/// chosen by number (line numbers refer to whole windows).
 ///
 /// # Errors
 /// [`AnalysisError::Estimate`] if a window cannot be checked.
@@ -62,8 +62,8 @@ pub(super) fn suit(records: &[Windowed], lines: &SpectralLines) -> Result<bool, 
 }
 
 /// Fits the frequency responses of one or several records, weighted by their coherence unless least
-/// squares is requested. Without a period and a length of segments, the length is chosen for the
-/// first record.
+/// squares is requested. If neither a period nor the length of the segments is given, a length is
+/// chosen from the first record.
 ///
 /// # Errors
 /// [`AnalysisError::InstrumentalResponses`] for instrumental variables.
@@ -84,8 +84,8 @@ pub fn fit(
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
-    // The fit ends here with an error that names the parameter if one is undetermined. Without
-    // this check, a later step would fail with a less useful error.
+    // An undetermined parameter ends the fit here with an error that names it. Without this check,
+    // a later step would fail with a less useful error.
     estimate.system()?;
     let periodic = segments.are_periods();
     let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
@@ -191,7 +191,7 @@ fn estimated(
     }
 }
 
-/// Returns a remark on a correction of the window that changes a parameter.
+/// Returns a remark if the correction of the window bias changes a parameter.
 pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
     (found.blunted > NOTED_WINDOW_CORRECTION).then(|| {
         format!(
@@ -265,8 +265,9 @@ fn after_fit(
     Ok(checks)
 }
 
-/// Tests the linearity on the lines between the first and the last one fitted; `None` for a free
-/// system: the test needs powers of the displacement, which cannot be computed for a free system.
+/// Tests the linearity on all lines from the first to the last fitted line. Returns `None` for a
+/// free system, because the test needs powers of the displacement, which cannot be computed for
+/// such a system.
 fn linearity_finding(
     measured: &Block,
     lines: &Lines,

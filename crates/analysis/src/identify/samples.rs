@@ -258,7 +258,8 @@ impl SampleFit {
         }
     }
 
-    /// Returns the largest distance, in samples, at which the noise of one sample has an effect.
+    /// Returns the largest distance, in samples, of two derivatives that contain the noise of the
+    /// same sample; 0 without a sliding polynomial.
     fn noise_span(&self) -> usize {
         self.derivatives.map_or(0, Derivatives::window).saturating_sub(1)
     }

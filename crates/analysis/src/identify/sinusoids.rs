@@ -1,4 +1,4 @@
-//! Sinusoids in open records that are not responses to the forces; they are subtracted.
+//! Sinusoids in the responses of open records that the forces do not cause; they are subtracted.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use crate::text::significant;
 
 /// Maximum number of frequencies that a remark lists.
 const NAMED: usize = 4;
-/// Maximum relative difference of equal frequencies in several records.
+/// Maximum relative difference of two frequencies, in different records, that count as equal.
 const SAME: f64 = 1e-3;
 
 /// A sinusoid in the responses of one record that the forces do not explain.

@@ -88,8 +88,8 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // The fit ends here with an error that names the parameter if one is undetermined. Without
-    // this check, a later step would fail with a less useful error.
+    // An undetermined parameter ends the fit here with an error that names it. Without this check,
+    // a later step would fail with a less useful error.
     estimate.system()?;
     let RecordFindings { before, mut after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
@@ -103,9 +103,8 @@ pub(super) fn fit(
     };
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
     let is_left = exceeds_noise(&residuals);
-    let quantity =
-        time_limit::apart(CAUSE_OPERATIONS, || quantity_of_periods(&data, &estimate, is_left));
-    let quantity = quantity.filter(|quantity| explains_more(quantity, &mut after));
+    let quantity = quantity_of_periods(&data, &estimate, is_left)
+        .filter(|quantity| explains_more(quantity, &mut after));
     let is_small = unknowns.free().len() <= TERM_PARAMETERS;
     let nonlinear = if is_left && is_small && quantity.is_none() {
         nonlinear_term(records, unknowns, lines)?
@@ -134,22 +133,18 @@ pub(super) fn fit(
 }
 
 /// Returns the finding that the responses are those of another quantity, if the estimate does not
-/// explain them: a test of the residual warns (`is_left`), or a conspicuous part of the response is
+/// explain them: a test of the residual warns (`warns`), or a conspicuous part of the response is
 /// unexplained. `None` for a fit of many parameters, because the quantities would take too long.
-fn quantity_of_periods(
-    data: &FrequencyData,
-    estimate: &Estimate,
-    is_left: bool,
-) -> Option<Finding> {
+fn quantity_of_periods(data: &FrequencyData, estimate: &Estimate, warns: bool) -> Option<Finding> {
     if estimate.unknowns().free().len() > TERM_PARAMETERS {
         return None;
     }
     let system = estimate.system().ok()?;
     let unexplained = unexplained_motion(data, &system).ok()?;
-    if !is_left && unexplained <= Some(CONSPICUOUS) {
+    if !warns && unexplained <= Some(CONSPICUOUS) {
         return None;
     }
-    other_quantity(data, data, estimate)
+    time_limit::apart(CAUSE_OPERATIONS, || other_quantity(data, data, estimate))
 }
 
 /// Returns whether less of the residual power remains with another quantity than with every delay
@@ -450,8 +445,8 @@ fn least_squares(
 }
 
 /// Returns the estimate by maximum likelihood from data with noise. If the noise may be the
-/// response to unmeasured forces, a second search takes the form of the noise from the system of
-/// the first search.
+/// response to unmeasured forces, the system of the first search gives the shape of the noise
+/// spectrum, and a second search uses this shape.
 fn likelihood(
     spectra: &[Spectra],
     noisy: &FrequencyData,
@@ -557,8 +552,8 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(repeated.with_quantisation(steps(&recorded.held))?)
 }
 
-/// Maximum ratio of a quantisation step to the RMS of its channel if the step is ignored: such fine
-/// rounding changes no parameter.
+/// Maximum ratio of a quantisation step to the RMS of its channel for which the step is ignored;
+/// such a fine step changes no parameter.
 const FINE: f64 = 3e-5;
 
 /// Returns the quantisation steps of responses and forces, in their units; 0 for a channel without

@@ -23,7 +23,7 @@ use crate::AnalysisError;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Structure {
-    /// Statements, in any order.
+    /// Statements on the form of M, C and K, in any order.
     pub forms: Vec<Form>,
 }
 
@@ -110,7 +110,7 @@ impl FromStr for Structure {
 }
 
 impl Structure {
-    /// Returns whether there is no statement.
+    /// Returns true if the structure contains no statement.
     pub fn is_empty(&self) -> bool {
         self.forms.is_empty()
     }

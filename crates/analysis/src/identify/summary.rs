@@ -67,7 +67,8 @@ pub struct IdentificationSummary {
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
-    /// Names of the channels, without units, one per degree of freedom; `"0"` where there is none.
+    /// Names of the channels, without units, one per degree of freedom; `"0"` for a missing
+    /// channel.
     pub channels: Channels,
     /// All fitted records, including the first; for a hammer test, all hits that were used.
     pub records: Vec<RecordRow>,
@@ -123,7 +124,8 @@ pub struct FitRow {
     /// Noise of the forces of each record if the spectra in `noise` are those of the response only,
     /// as for open records.
     pub force_noise: Vec<ForceNoise>,
-    /// Sinusoids in open records that are not a response to the forces and were subtracted.
+    /// Sinusoids in the responses of open records that the forces do not cause; they were
+    /// subtracted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sinusoids: Vec<SinusoidRow>,
     /// Factor that multiplies the standard errors computed from the noise: above 1 if parts of the

@@ -143,8 +143,8 @@ impl TableFit {
         })
     }
 
-    /// Compares the fit with its bands of lines and, if there are several, with the `measured`
-    /// tables.
+    /// Compares the bands of lines with each other and, if there are several `measured` tables,
+    /// also the tables with each other.
     fn compared(
         &self,
         data: &FrequencyData,

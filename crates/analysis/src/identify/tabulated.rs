@@ -96,9 +96,9 @@ fn reciprocity(table: &FrequencyResponses, force: &str) -> &'static str {
     "; by reciprocity (`structure` symmetric) a row of responses also serves as a column"
 }
 
-/// Returns a table with missing responses replaced by the reciprocal responses, with a remark.
-/// Returns the table itself if the responses to every force are complete, or if reciprocity cannot
-/// complete the responses to any force.
+/// Returns a table in which reciprocal responses replace missing responses, with a remark on this.
+/// Returns the table itself if `structure` is not symmetric, if points are chosen, if the responses
+/// to every force are complete, or if reciprocity cannot complete the responses to any force.
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), section 2.5 (symmetric matrices have a symmetric

@@ -1,4 +1,4 @@
-//! Tables with fewer lines, to decide questions whose answer on all lines takes long.
+//! Tables with fewer lines, for questions that take long to answer with all lines.
 
 use mechid_estimate::Unknowns;
 use mechid_io::FrequencyResponses;
@@ -98,11 +98,13 @@ mod tests {
 
     #[test]
     fn long_tables_keep_enough_lines() {
-        // 40 equations for each of three unknowns are 60 lines, fewer than the minimum of 100.
+        // Three unknowns need 40 equations each, which are 60 lines; this is below the minimum of
+        // 100 lines. A table with fewer than twice this minimum keeps all its lines.
         assert_eq!([50, 160, 199].map(|lines| tried(lines, None)), [None; 3]);
         assert_eq!(tried(400, None), Some(100));
         assert_eq!(tried(40_000, None), Some(4000));
-        // Only the lines in the band count.
+        // The minimum of 100 refers to the 250 lines in the band, so every second line of the table
+        // must remain.
         let band = Some(Band { low_hz: 1.0, high_hz: 250.0 });
         assert_eq!(tried(1000, band), Some(500));
         let how = IdentifyResponses::default();

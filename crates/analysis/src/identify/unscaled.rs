@@ -25,8 +25,9 @@ pub struct Unscaled {
 }
 
 impl Unscaled {
-    /// Fits the modes of equations without scale if `fit` refuses these equations; the forces act
-    /// on the degrees of freedom `driven`, counted from 0.
+    /// Calls `fit`. If `fit` refuses equations without scale, calls it again with unknowns that
+    /// give these equations a scale and keep the modes. The forces act on the degrees of freedom
+    /// `driven`, counted from 0.
     ///
     /// # Errors
     /// The errors of `fit`.
@@ -91,7 +92,8 @@ impl Unscaled {
         }
     }
 
-    /// Refuses forces, on degrees of freedom counted from 0, whose responses are unknown.
+    /// Refuses forces on degrees of freedom (`driven`, counted from 0) whose equations have no
+    /// scale, because the responses to these forces are unknown.
     pub(super) fn check_forces(&self, driven: &[usize]) -> Result<(), AnalysisError> {
         let is_unknown = |dof: &usize| self.degrees_of_freedom.contains(&(dof + 1));
         Self::check(driven.iter().any(is_unknown).then_some(self))

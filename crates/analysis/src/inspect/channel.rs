@@ -23,7 +23,7 @@ pub struct Channel {
     pub column: usize,
     /// Name.
     pub name: String,
-    /// Further description in the file.
+    /// Description of the channel in the file, in addition to its name.
     pub about: String,
     /// Mean, in the unit of the channel.
     pub mean: f64,
@@ -62,9 +62,9 @@ pub struct SpectrumPeak {
 /// Clipping of a channel by an amplifier or a converter.
 #[derive(Debug, Serialize)]
 pub struct Cut {
-    /// Amplitude, in the unit of the channel.
+    /// Value at which the channel is clipped, with its sign, in the unit of the channel.
     pub level: f64,
-    /// Number of samples at this amplitude, in runs of at least three.
+    /// Number of clipped samples: those with the value `level` in runs of at least three samples.
     pub samples: usize,
 }
 
@@ -108,7 +108,8 @@ impl Gathered {
         Self { extremes: drawn.then(|| Extremes::new(window)), ..Self::default() }
     }
 
-    /// Adds the next samples; of all samples the first `hold` are stored.
+    /// Adds the next samples to the statistics, and stores only the first `hold` samples of the
+    /// channel.
     pub(crate) fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
         if let Some(extremes) = &mut self.extremes {
@@ -199,7 +200,7 @@ impl AmplitudeSpectrum {
     fn strongest(&self, dt: Option<f64>) -> Vec<SpectrumPeak> {
         let at = |n: usize| self.amplitude.get(n).copied().unwrap_or(0.0);
         let strongest = self.amplitude.iter().skip(1).copied().fold(0.0, f64::max);
-        // Lines with equal amplitudes up to rounding are sorted by frequency.
+        // Lines whose amplitudes differ only by rounding are sorted by frequency.
         let level = |n: usize| (at(n) / strongest / EQUAL).round();
         let is_peak = |n: &usize| level(*n) >= level(n - 1).max(level(n + 1));
         let mut peaks: Vec<usize> = (1..self.amplitude.len())

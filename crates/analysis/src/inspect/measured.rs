@@ -17,7 +17,8 @@ pub struct Shown {
     pub index: usize,
     pub column: usize,
     pub offset: f64,
-    /// `true` if lines and a period are to be detected; a column of instants has none.
+    /// `true` if spectral lines and a period are detected in this column; `false` for a column of
+    /// times that was not requested.
     pub spectral: bool,
     /// `true` if the column is also plotted.
     pub drawn: bool,

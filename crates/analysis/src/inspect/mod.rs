@@ -184,7 +184,9 @@ impl Inspection<'_> {
         })
     }
 
-    /// Returns whether period and lines of a column are to be detected; instants are not a signal.
+    /// Returns whether the period and the spectral lines of a column are detected: yes for every
+    /// requested column; without requested columns, yes for every column except `instants`, the
+    /// column of the times.
     fn is_signal(&self, column: usize, instants: Option<usize>) -> bool {
         !self.columns.is_empty() || Some(column) != instants
     }

@@ -30,7 +30,7 @@ pub struct RecordSummary {
     pub channels: Vec<Channel>,
     /// Single numbers in the file.
     pub scalars: Vec<Scalar>,
-    /// Further remarks of the file.
+    /// Remarks on the file and on its contents.
     pub remarks: Vec<String>,
     /// Columns not shown, each with the reason.
     pub left_out: Vec<String>,

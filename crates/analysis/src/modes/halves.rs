@@ -3,6 +3,7 @@
 use mechid_modal::ambient::AmbientEstimate;
 use mechid_modal::compare::{ComparedMode, Measured, ModePair};
 use mechid_modal::{ModalEstimate, ModalSettings, PartsComparison};
+use mechid_numerics::time_limit;
 use mechid_signal::{Record, message};
 
 use super::forced::LISTED;
@@ -44,7 +45,9 @@ impl Halves {
         let compare = |first: &Record, second: &Record| {
             PartsComparison::of_ambient(estimate, [first, second]).ok()
         };
-        let compared = half(0).zip(half(len)).and_then(|(first, second)| compare(&first, &second));
+        // Refits to the halves would change little of their initial estimates after the limit.
+        let halves = half(0).zip(half(len)).filter(|_| !time_limit::is_over());
+        let compared = halves.and_then(|(first, second)| compare(&first, &second));
         let hz = estimate.modes.iter().map(|mode| mode.natural_frequency_hz.value).collect();
         Self::from_comparison(compared, hz, "the record")
     }

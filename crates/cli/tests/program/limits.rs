@@ -269,8 +269,8 @@ fn many_nonlinear_terms_are_refused_before_any_work() {
 }
 
 /// The white noise of the response has nothing to do with the force, so the searches find no
-/// machine. The limit of the work ends them: with little memory early, with a time limit not at
-/// all. Both results name the limit that ended the search, if one did.
+/// machine. With little memory, the limit of the work ends them, and the message names this limit;
+/// a long time limit replaces it, and no message names a limit.
 #[test]
 fn a_search_ends_at_the_limit_of_its_work() {
     let home = tempfile::tempdir().unwrap();

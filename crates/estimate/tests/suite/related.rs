@@ -259,7 +259,7 @@ fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
         let ratio = (squares / runs as f64).map(f64::sqrt).component_div(&bound);
         let mean = ratio.mean();
         // The standard deviation of 200 runs has an uncertainty of 5 %, and the standard deviations
-        // of the entries of a chain are correlated.
+        // of the entries of a chain are correlated, so their mean is hardly more accurate.
         assert!((0.9..1.1).contains(&mean), "proportional {proportional}: {ratio}");
         if proportional {
             let coverage = factors as f64 / (2.0 * runs as f64);
@@ -268,8 +268,8 @@ fn related_entries_are_estimated_at_the_bound_with_intervals_that_hold() {
     }
 }
 
-/// Noise on the recorded force in each equation: the intervals of least squares with related
-/// entries contain the truth as often as stated.
+/// With noise on the recorded force in each equation, the 95 % intervals of least squares with
+/// related entries contain the truth as often as stated.
 #[test]
 fn least_squares_of_related_entries_has_intervals_that_hold() {
     let system = chain(3);
@@ -322,8 +322,8 @@ fn relations_that_contradict_are_refused() {
     assert!(matches!(refused, EstimateError::Related { .. }), "{refused}");
 }
 
-/// Two masses are not connected, and only the first one has a force: the undetermined directions
-/// are named.
+/// If two masses are not connected and a force acts only on the first one, the estimate reports m22
+/// as undetermined, and output error returns an error.
 #[test]
 fn what_relations_do_not_determine_is_named() {
     let system = SecondOrderSystem::new(

@@ -31,8 +31,9 @@ fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     assert!((natural_hz - 72.38).abs() < 0.05, "{natural_hz} Hz");
     assert!((mode.damping_ratio() - 0.0471).abs() < 0.0005, "ζ = {}", mode.damping_ratio());
 
-    // Maximum likelihood gives the residual of the cubic spring other weights, so its estimate is
-    // close to the published value, but not equal.
+    // Maximum likelihood and equation error weight the lines differently, and a linear model does
+    // not explain the cubic spring. The estimate of maximum likelihood is therefore close to the
+    // published value, but not equal.
     let likely = output_error(&data, &unknowns).unwrap().estimate.system().unwrap();
     let mode = &likely.modes().unwrap()[0];
     let natural_hz = mode.natural_frequency() / std::f64::consts::TAU;

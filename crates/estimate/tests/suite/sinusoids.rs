@@ -73,15 +73,16 @@ fn run_out_between_lines_does_no_harm() {
             gap(&with, &without)
         };
         let gaps: Vec<f64> = (0..2_u64).into_par_iter().map(check).collect();
-        // A sinusoid next to a resonance reduces the information of the lines there, so the two
-        // estimates differ slightly.
+        // A sinusoid next to a resonance reduces the information of the neighbouring lines, so the
+        // parameters with and without the sinusoids differ slightly.
         let gap = (gaps.iter().sum::<f64>() / gaps.len() as f64).sqrt();
         assert!(gap < 0.3, "{quantity}: {gap} standard errors");
     }
 }
 
-/// No sinusoid is reported in six records without sinusoids, even if a resonance with 0.1 % damping
-/// is narrower than a line. By chance, fewer than one in 20 such records has a false report.
+/// No sinusoid is reported in six records without sinusoids, even if the resonance has only 0.1 %
+/// damping and is narrower than the line spacing. By chance, fewer than one in 20 such records has
+/// a false report.
 #[test]
 fn records_without_sinusoids_have_none() {
     let light = Sdof::new(10.0, 2.0 * 0.001 * 10.0 * 157.0, 10.0 * 157.0 * 157.0).unwrap();
@@ -111,8 +112,8 @@ fn what_is_no_sinusoid_is_not_taken_for_one() {
         let [force, response] = noisy(&rig, seed);
         let spacing_hz = 1.0 / (SAMPLES as f64 * DT);
         let unit = response.column(0).variance().sqrt();
-        // The disturbance has 80 neighbouring lines, with random phases, of a record eight times as
-        // long.
+        // The disturbance is the sum of 80 cosines with random phases. Their frequencies are an
+        // eighth of the line spacing apart and cover ten lines.
         let phases = noise::white(Sampling::new(1.0, 80).unwrap(), 1, 10.0, seed).unwrap();
         let disturbance = |t: f64| {
             let lines =

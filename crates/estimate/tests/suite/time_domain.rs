@@ -116,8 +116,8 @@ fn a_force_that_is_zero_is_left_out() {
     let known = Unknowns::known_mass(system.mass()).unwrap();
     let found = fit(FirstOrderHold, Extent::WholePeriod, &motion, &force, &known);
     assert!(error(&found, &system) < EXACT);
-    // If the mass is unknown, the equation of the first direction is determined only up to a
-    // factor.
+    // No force acts in the first direction. If the mass is unknown, the equation of motion in this
+    // direction is determined only up to a factor, and the fit returns an error.
     let estimator = TimeDomain::new(FirstOrderHold, Extent::WholePeriod);
     let unknown = Unknowns::unknown_mass(2).unwrap();
     let refused = estimator.fit(motion.displacement(), motion.velocity(), &force, &unknown);

@@ -108,8 +108,9 @@ proptest! {
         }
     }
 
-    /// If the same period is used twice, the values do not change, and the variance is halved,
-    /// apart from the change in the number of degrees of freedom.
+    /// If the same period is used twice, the parameters do not change. Their variances are
+    /// multiplied by the ratio of the degrees of freedom of the residual (one period to two
+    /// periods), which is about ½.
     #[test]
     fn a_record_twice(seed in 0u64..1000) {
         let data = measured(seed);

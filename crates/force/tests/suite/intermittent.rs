@@ -19,7 +19,7 @@ fn oscillator() -> SecondOrderSystem {
 }
 
 /// Returns every eighth sample of a force and of the exact accelerations that it causes from rest.
-/// The accelerations have 1 % of noise.
+/// White noise with a standard deviation of 1 % of their RMS value is added to the accelerations.
 fn measured(
     system: &SecondOrderSystem,
     force: impl Fn(f64) -> f64,
@@ -47,7 +47,8 @@ fn measured(
 
 /// The intervals contain the force of an impact at 88 % of the samples or more. The spectrum of a
 /// pulse falls like that of a stationary force model of low order. A fit of this model to the whole
-/// record mistakes all noise for force: only 51 % of its intervals contained the force.
+/// record mistakes all noise for force: its intervals contained the force at only 51 % of the
+/// samples.
 #[test]
 fn the_error_of_an_impact_is_that_of_its_noise() {
     let runs = 4;
@@ -71,7 +72,8 @@ fn the_error_of_an_impact_is_that_of_its_noise() {
     };
     let held: Vec<f64> = (1..=runs).map(held).collect();
     let mean = held.iter().sum::<f64>() / runs as f64;
-    // The errors are correlated over half a second: each record has a few dozen independent errors.
+    // The errors are correlated over half a second, so each record has only a few dozen independent
+    // errors, and the limit is well below 0.95.
     assert!(mean > 0.88, "{held:?}");
 }
 

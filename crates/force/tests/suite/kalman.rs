@@ -63,7 +63,8 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
         let measured = displacements(&response, 0.02, 9);
         let found =
             kalman(&system, &measured, &[forced], Start::FromRest, &Tuning::Likelihood).unwrap();
-        // 4000 samples determine a standard deviation to 1 %; walk and noise are partly confounded.
+        // 4000 samples determine a standard deviation to 1 %. The limits below are wider, because
+        // the walk and the noise are partly confounded.
         assert_eq!(found.model.order, 1);
         let walk = walk(&found, 0);
         assert!((walk / 40.0 - 1.0).abs() < 0.1, "walk {walk}");
@@ -71,8 +72,8 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
             let size = response.displacement().column(c).norm() / 4000f64.sqrt();
             assert!((level / (0.02 * size) - 1.0).abs() < 0.05, "channel {c}: {level}");
         }
-        // The errors of neighbouring samples are correlated, so some hundred independent errors
-        // remain.
+        // The errors of neighbouring samples are correlated, so the record has only about a hundred
+        // independent errors.
         let normalised_mean_square_error = normalised_mean_square_error(&found, &truth, forced);
         assert!(
             (0.75..1.3).contains(&normalised_mean_square_error),
@@ -172,8 +173,9 @@ fn bad_requests_are_refused_with_their_numbers() {
         ask(&system, &one, &[0], &Tuning::NoiseKnown(vec![0.0])),
         ForceError::NotPositive { what: "noise level", value: 0.0 }
     );
-    // Forces cannot be separated if the forced machine is not coupled to the measured machine, or
-    // if two channels measure the same quantity.
+    // A force has no effect on the channels if its degree of freedom is not coupled to a measured
+    // one. Two channels that measure the same quantity at the same degree of freedom cannot
+    // separate two forces.
     let diagonal = |a: f64, b: f64| DMatrix::from_diagonal(&dvector![a, b]);
     let apart =
         SecondOrderSystem::new(diagonal(1.0, 1.0), diagonal(1.0, 1.0), diagonal(90.0, 70.0))

@@ -50,8 +50,8 @@ fn scatter(runs: u64, samples: usize, find: impl Fn(&Response) -> Record) -> DMa
 }
 
 /// Checks that stated and observed standard deviations agree. A standard deviation from 400 draws
-/// has an uncertainty of 1/√800 = 3.5 %. The limit is four times this value at every sample, and a
-/// third of that for the RMS over all twelve samples.
+/// has an uncertainty of 1/√800 = 3.5 %. The limit is four times this uncertainty at every sample,
+/// and about a third of this limit for the RMS value over all twelve samples.
 fn agree(stated: &Record, seen: &DMatrix<f64>) {
     for (stated, seen) in stated.data().iter().zip(seen) {
         assert!((stated / seen - 1.0).abs() < 0.14, "{stated}, seen {seen}");

@@ -77,8 +77,8 @@ fn the_likelihood_rule_stays_near_the_best_parameter_as_the_book_prints() {
     assert_printed("| Excited |", &rule_table(&rows));
 }
 
-/// Cases for which the book states that 95 % intervals contain the force: over twelve records, the
-/// intervals contain the force at 89 to 99 % of the samples.
+/// Checks forces for which the coverage of the 95 % intervals in the book is near 95 %: over twelve
+/// records, the intervals must contain the force at 89 to 99 % of the samples.
 #[test]
 fn intervals_hold_the_force_of_bands_lines_and_walks() {
     for name in

@@ -39,8 +39,8 @@ fn force(len: usize, dof: usize, forced: &[usize], value: impl Fn(usize, usize) 
     Record::new(sampling(len), data).unwrap()
 }
 
-/// Returns one column per unit sample of each force: the scaled result of `answer`, channel after
-/// channel.
+/// Returns a matrix with one column for each sample of each force. The column has the scaled
+/// response, channel after channel, to a force that is 1 at this sample and 0 at all others.
 fn columns(
     len: usize,
     dof: usize,
@@ -180,7 +180,8 @@ fn truncation_that_drops_nothing_is_least_squares() {
 
 #[test]
 fn the_standard_error_is_what_is_seen() {
-    // Tikhonov's λ, as a Bayesian prior, assumes a white force on every line.
+    // The true force is white on every line, as Tikhonov's method assumes if λ is regarded as a
+    // Bayesian prior.
     let system = random_stable(2, 5);
     let len = 255;
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::Shrinkage] {
@@ -231,7 +232,8 @@ fn without_noise_every_rule_gives_the_force() {
             let noise = Noise::Unknown;
             let found = regularised(&system, &measured, &[1], &extent, filter, &noise).unwrap();
             let error = relative_error(found.force.record(), &truth).unwrap();
-            // The smallest λ of the grid is eight decades below the largest singular value.
+            // The error may exceed rounding, because the smallest λ of the grid is not zero: it is
+            // eight decades below the largest singular value.
             assert!(error < 1e-3, "{extent:?}, {filter:?}: {error:.1e}");
         }
     }

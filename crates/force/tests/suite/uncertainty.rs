@@ -127,8 +127,9 @@ fn a_truncation_is_not_at_the_mercy_of_the_machine() {
     );
 }
 
-/// For one force and two channels, the residual expected from the uncertainty of the system agrees
-/// with the RMS value of the residuals of an exact record over machines drawn from the covariance.
+/// For one force and two channels, the uncertainty of the system gives an expected residual. It
+/// agrees with the RMS value of the residuals that an exact record has with machines drawn from the
+/// covariance.
 #[test]
 fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
     let measured =

@@ -78,7 +78,8 @@ fn on_lines_the_rest_is_that_of_least_squares() {
         close(channel.residual, rest, 1e-9);
         close(channel.motion, seen.max(made), 1e-9);
         close(channel.share(), rest / seen.max(made), 1e-9);
-        // Four of the lines of 64 samples have 8/64 of the power of white noise.
+        // Each of the four lines, with its conjugate, has 2/64 of the power of white noise in 64
+        // samples.
         close(channel.noise.unwrap(), level[c] * (8.0_f64 / 64.0).sqrt(), 1e-12);
         assert!(channel.share() > 0.01 && channel.system.is_none());
     }

@@ -136,7 +136,8 @@ fn fixed_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<
     [xs, vs, accs]
 }
 
-/// Runs the trapezoidal rule as one 4×4 product; (I − ½ΔtS)⁻¹ is computed beforehand.
+/// Runs the trapezoidal rule with one product by a 4×4 matrix in each step; (I − ½ΔtS)⁻¹ is
+/// computed beforehand.
 fn transition_2<const ALL: bool>(system: &SecondOrderSystem, force: &Record) -> [Vec<f64>; 3] {
     let (dt, len) = (force.sampling().dt(), force.len());
     let s = Matrix4::from_fn(|i, j| system.state_matrix()[(i, j)]);

@@ -40,8 +40,8 @@ fn schemes() -> Vec<(&'static str, Box<dyn Scheme>)> {
     ]
 }
 
-/// A lightly damped chain of `dof` masses; every mass is coupled to all others, and the natural
-/// frequencies are at most about 60 rad/s.
+/// Returns a lightly damped system of `dof` masses. Stiff springs couple neighbouring masses, weak
+/// springs couple all other pairs, and the natural frequencies are at most about 60 rad/s.
 fn chain(dof: usize) -> SecondOrderSystem {
     let stiffness = DMatrix::from_fn(dof, dof, |i, j| match i.abs_diff(j) {
         0 => 2000.0,

@@ -60,11 +60,11 @@ impl SparseMode {
 /// ```
 ///
 /// The matrix K + σC + σ²M is factored with σ = 0 (a small negative number if K is singular) or σ =
-/// iω. A subspace grows until the modes are exact to rounding. Its maximum size is 20 vectors for
-/// each mode, and 200 more. Modes that are too close together, such as those above the frequency of
-/// the springs to ground, do not converge in this space. σ then moves to the first of these modes,
-/// and the search begins again. A search uses at most eight shifts. Multiple eigenvalues are found
-/// up to a multiplicity of four. The result is very likely complete, but this is not proved.
+/// iω. A subspace grows until the modes are exact to rounding. Its maximum size is 200 vectors plus
+/// 20 for each mode. Modes that are too close together, such as the lowest modes of a large grid
+/// with stiff springs to ground, do not converge in this space. σ then moves to the first of these
+/// modes, and the search begins again. A search uses at most eight shifts. Multiple eigenvalues are
+/// found up to a multiplicity of four. The result is very likely complete, but this is not proved.
 ///
 /// # Errors
 /// [`IntegrateError::SearchFrequency`] for an ω that is not positive and finite,

@@ -32,8 +32,8 @@ impl Reach {
         Self { shift, radius: converged.last().map_or(0.0, |(distance, _)| *distance) }
     }
 
-    /// Returns the first of the modes within the radius; modes outside it were found from another
-    /// shift.
+    /// Returns the eigenvalue of the first mode within the radius; `modes` also contains modes that
+    /// were found from other shifts.
     fn first(&self, modes: &[Candidate]) -> Option<Complex<f64>> {
         let within = |value: &Complex<f64>| (value - self.shift).norm() <= self.radius;
         modes.iter().map(Candidate::value).find(within)

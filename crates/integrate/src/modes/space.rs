@@ -91,8 +91,8 @@ impl Space {
             return Err(overflow());
         }
         let remainder = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
-        // The image of basis vector j added a vector to the basis. The last entry of column j
-        // belongs to this added vector.
+        // The last entry of column j belongs to the vector that the image of basis vector j added
+        // to the basis. Entries more than `below` rows below the diagonal are therefore zero.
         let below = self.columns.iter().enumerate().map(|(j, column)| column.len() - 1 - j);
         let below = below.max().unwrap_or(0);
         let mut modes: Vec<Candidate> = Vec::new();

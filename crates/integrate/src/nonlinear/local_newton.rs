@@ -154,8 +154,8 @@ pub(crate) struct LocalNewton {
 }
 
 impl LocalNewton {
-    /// Prepares for a scheme with the given γ̂ and β̂; `influence` is M̂⁻¹ at the degrees of
-    /// freedom of `forces`, n×p.
+    /// Creates the equation for a scheme with the given γ̂ and β̂; `influence` is M̂⁻¹ at the
+    /// degrees of freedom of `forces`, n×p.
     pub(crate) fn new(
         forces: LocalForces,
         gamma_hat: f64,
@@ -248,7 +248,8 @@ impl LocalNewton {
         Err(IntegrateError::NotSolved { time, residual: missed })
     }
 
-    /// Returns the largest acceleration, to which a residual is compared.
+    /// Returns the largest modulus of an acceleration; the limits of the residual are relative to
+    /// it.
     fn size(&self) -> f64 {
         self.linear.amax().max(self.a.amax())
     }

@@ -4,7 +4,8 @@ use mechid_model::{Coordinate, ModelError, Term, Terms};
 
 use crate::nonlinear::force::{NonlinearForce, Tangents};
 
-/// Nonlinear springs and dampers as they are identified: θ f(q, q̇) of every term.
+/// Nonlinear springs and dampers in the form in which they are identified: each term has the force
+/// θ f(q, q̇).
 ///
 /// ```
 /// use mechid_integrate::{NonlinearForce, TermForces};
@@ -46,7 +47,7 @@ impl TermForces {
     }
 }
 
-/// The degrees of freedom of a coordinate.
+/// Returns the degrees of freedom of a coordinate: one, or two for a difference.
 fn dofs_of(coordinate: Coordinate) -> Vec<usize> {
     match coordinate {
         Coordinate::Dof(i) => vec![i],

@@ -22,8 +22,9 @@ use crate::system::System;
 /// Over one period the scheme is an affine map of its state, z_N = Φ z_0 + g. The periodic state
 /// solves (I − Φ) z_0 = g; one pass from rest gives g, and a second pass gives the response. The
 /// cost is about two passes, plus the powers of a matrix with two rows per degree of freedom (three
-/// for Houbolt and Wilson θ). If the damping is so small that rounding over the period leaves a
-/// gap, the same factors reduce the gap and the pass is repeated.
+/// for Houbolt and Wilson θ). If the damping is very small, rounding leaves a difference between
+/// z_0 and the state at the end of the second pass; the same factors then correct z_0, and the pass
+/// is repeated.
 ///
 /// For more than 300 degrees of freedom Φ is not formed: z_0 is found in the Krylov space of g, Φ
 /// g, Φ² g … (GMRES), at one pass per vector. Few vectors suffice if most of the motion decays
@@ -50,7 +51,8 @@ pub fn integrate_periodic<'a>(
 }
 
 /// Finds the response as [`integrate_periodic`] does, but for selected degrees of freedom: the
-/// force has samples × `dofs.forced` (N), the response samples × `dofs.observed`.
+/// force has one column (N) for each degree of freedom in `dofs.forced`, the response one for each
+/// in `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{Newmark, SelectedDofs, integrate_periodic_selected};

@@ -73,18 +73,18 @@ impl PeriodicOrbit {
 /// From `guess` the system first moves freely for `settling` periods, which leads to a stable orbit
 /// nearby; Newton's method on the state at the first sample then closes the orbit, stable or not. A
 /// nonlinear system may have several orbits. Some may repeat only after two or more periods of the
-/// force; to find them, give as many periods of the force. Nonlinear forces that depend on time
-/// must repeat with the force.
+/// force; to find these, give a force record of that number of periods. Nonlinear forces that
+/// depend on time must repeat with the force.
 ///
 /// If the number of samples is even, the orbit is found again with twice the step. The difference
-/// shows the error of the multipliers due to the time step; the second search increases the time by
-/// half.
+/// shows the error of the multipliers due to the time step; the second search increases the
+/// computing time by half.
 ///
-/// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of
-/// the state. For more degrees of freedom, the derivative of the state over a period is not formed.
-/// The step is then found in the Krylov space of products with this derivative (GMRES), at two
-/// passes for each product. Few products suffice if most of the motion decays within a period, but
-/// many lightly damped modes need many products. For linear systems
+/// Up to 64 degrees of freedom a Newton step costs two passes over the period for each entry of the
+/// state. For more degrees of freedom, the derivative of the state over a period is not formed. The
+/// step is then found in the Krylov space of products with this derivative (GMRES), at two passes
+/// for each product. Few products suffice if most of the motion decays within a period, but many
+/// lightly damped modes need many products. For linear systems
 /// [`integrate_periodic`](crate::integrate_periodic) finds the response directly.
 ///
 /// ```
@@ -133,7 +133,8 @@ pub fn periodic_orbit<'a>(
 }
 
 /// Finds a periodic response as [`periodic_orbit`] does, but for selected degrees of freedom: the
-/// force has samples × `dofs.forced` (N), the response samples × `dofs.observed`.
+/// force has one column (N) for each degree of freedom in `dofs.forced`, the response one for each
+/// in `dofs.observed`.
 ///
 /// # Errors
 /// The errors of [`periodic_orbit`]; [`IntegrateError::DofOutside`] and
@@ -285,7 +286,8 @@ fn nearer(
         let next = state + step.component_mul(&shooting.scales) * part;
         match shooting.gap(&next) {
             Ok(gap) if Shooting::largest_modulus(&gap) < missed => return Ok(Some([next, gap])),
-            // The new state is too far away if the equation of a step has no solution.
+            // The change of the state was too large if a time step from the new state has no
+            // solution.
             Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
             Err(other) => return Err(other),
         }
@@ -312,7 +314,7 @@ fn by_products(
                 shooting.derivative(&state, direction, derivative)
             })?;
         log::debug!(
-            "relative change of the state over a period: {missed:.1e}; Newton step from {} products, relative \
+            "relative change of the state over a period: {missed:.1e}; Newton step from {} Krylov vectors, relative \
              residual {:.1e}",
             step.products,
             step.residual
@@ -368,7 +370,7 @@ mod tests {
     use crate::schemes::newmark::Newmark;
     use crate::schemes::runge_kutta::RungeKutta4;
 
-    /// The state and the largest multiplier that are found from products are compared with those
+    /// The state and the largest multiplier that are found in Krylov spaces are compared with those
     /// from the derivative formed as a matrix.
     #[test]
     fn products_lead_to_the_orbit_of_the_whole_derivative() {
@@ -405,7 +407,8 @@ mod tests {
             assert!(missed < 1e-9, "{}: {missed:e}", scheme.name());
             let (largest, error) = largest_multiplier(&mut shooting, &found).unwrap().unwrap();
             let gap = (largest.norm() - multipliers[0].norm()).abs();
-            // For a matrix without symmetry, the error is a small multiple of the residual.
+            // For a matrix without symmetry, the error of an eigenvalue may be a small multiple of
+            // its residual, so the first limit is larger.
             assert!(gap < 1e-5 && error < 1e-6, "{}: {gap:e} {error:e}", scheme.name());
             assert!(largest.norm() > 0.1, "{largest}");
         }

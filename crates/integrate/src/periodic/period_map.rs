@@ -101,7 +101,8 @@ impl PeriodMap {
     }
 }
 
-/// Blocks of the change D of the state in a step: the accelerations, and the rest of the state.
+/// Blocks of the matrix D; D times the state is the change of the state in a step. The
+/// accelerations and the other entries of the state have separate blocks.
 struct Blocks {
     rest_rest: DMatrix<f64>,
     rest_acceleration: DMatrix<f64>,
@@ -121,15 +122,15 @@ impl Blocks {
         }
     }
 
-    /// Returns G with (rows of A at the accelerations) = G (all other rows of A), if such a G
-    /// exists to rounding.
+    /// Returns the matrix G for which the rows of A = I + D at the accelerations are G times all
+    /// other rows of A, if such a G exists to rounding.
     fn following(&self) -> Option<DMatrix<f64>> {
         let states = self.rest_rest.nrows();
         let amplification = &self.rest_rest + DMatrix::identity(states, states);
         let following =
             amplification.transpose().lu().solve(&self.acceleration_rest.transpose())?.transpose();
         let n = self.acceleration_acceleration.nrows();
-        // The diagonal block of A at the accelerations is I + D.
+        // The diagonal block of A at the accelerations is I plus the same block of D.
         let acceleration = &self.acceleration_acceleration + DMatrix::identity(n, n);
         let missed = &acceleration - &following * &self.rest_acceleration;
         let size = 1.0 + following.norm() * self.rest_acceleration.norm();
@@ -169,7 +170,8 @@ fn smallest_singular_value(factored: &LU<f64, Dyn, Dyn>) -> f64 {
     let (lower, upper) = (factored.l(), factored.u());
     let mut direction = DVector::from_fn(lower.nrows(), |i, _| 1.0 + 0.37 * (i % 5) as f64);
     let mut smallest = f64::INFINITY;
-    // Six iterations give the order of magnitude, which is enough.
+    // Six iterations give the order of magnitude of the singular value, which is enough for its
+    // comparison with the rounding error.
     for _ in 0..6 {
         direction.normalize_mut();
         // The transposed matrix is Uᵀ Lᵀ P.

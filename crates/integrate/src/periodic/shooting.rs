@@ -119,8 +119,9 @@ impl<'a> Shooting<'a> {
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
     }
 
-    /// Writes the derivative of the state at the end of the period in a direction of the state at
-    /// the beginning into `derivative`; both states are relative to the scales.
+    /// Writes the change of the state at the end of the period for a small change of the state at
+    /// the beginning along `direction`, per unit of this change, into `derivative`. Both states are
+    /// relative to the scales.
     pub(crate) fn derivative(
         &mut self,
         state: &DVector<f64>,

@@ -11,7 +11,8 @@ use crate::stepping::selected_dofs::SelectedDofs;
 
 /// Computes the periodic response of a sparse system to a periodic force. The force acts on
 /// `dofs.forced`; the response is returned at `dofs.observed`. The force is band-limited between
-/// its samples and has samples × `dofs.forced` (N); the response has samples × `dofs.observed`.
+/// its samples. Its record has one column (N) for each degree of freedom in `dofs.forced`; the
+/// response has one for each in `dofs.observed`.
 ///
 /// ```
 /// use mechid_integrate::{SelectedDofs, sparse_steady_state};
@@ -30,8 +31,8 @@ use crate::stepping::selected_dofs::SelectedDofs;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// K − ω²M + iωC is factored once for each line with force, which sets the time and the memory. The
-/// stability of the system is not checked.
+/// K − ω²M + iωC is factored once for each line with force; these factorisations determine the
+/// computing time and the memory. The stability of the system is not checked.
 ///
 /// # Errors
 /// [`IntegrateError::DofOutside`], [`IntegrateError::ForcedTwice`], [`IntegrateError::Components`]

@@ -60,7 +60,7 @@ impl Bathe {
         Ok(Self { rho, splitting, force: SubStepForce::Linear })
     }
 
-    /// Returns the scheme with another force at the end of the first sub-step.
+    /// Returns the scheme with this choice of the force at the end of the first sub-step.
     #[must_use]
     pub fn with_force(self, force: SubStepForce) -> Self {
         Self { force, ..self }

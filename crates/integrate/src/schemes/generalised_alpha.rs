@@ -105,7 +105,7 @@ impl GeneralisedAlpha {
         Self { member, rho, alpha_m, alpha_f, acceleration: AlphaAcceleration::default() }
     }
 
-    /// Returns the scheme with another choice of the acceleration that it returns.
+    /// Returns the scheme with this choice of the acceleration in its responses.
     #[must_use]
     pub fn with_acceleration(self, acceleration: AlphaAcceleration) -> Self {
         Self { acceleration, ..self }
@@ -231,7 +231,7 @@ impl Stepper for GeneralisedAlphaStepper {
         let carried = self.state_len() - n;
         let a = &state[carried..];
         for i in 0..n {
-            // For a_m = 0 the new a is −κ α_m a.
+            // The unknown a_m is set to zero here; the new a is then −κ α_m a.
             let (a, of_zero) = (a[i], -kappa * alpha_m * a[i]);
             change[i] = dt * (v[i] + dt * ((0.5 - beta) * a + beta * of_zero));
             change[n + i] = dt * ((1.0 - gamma) * a + gamma * of_zero);

@@ -17,7 +17,7 @@ pub enum HouboltStart {
     /// Motion from two steps of Newmark's average acceleration.
     #[default]
     AverageAcceleration,
-    /// Motion from two steps of central difference, which starts with the Taylor step.
+    /// Motion from two steps of central difference, started with x(−Δt) from Taylor's series.
     CentralDifference,
     /// Displacements given by the caller, in m. The velocities at these instants are differences of
     /// second order over x(0), x(Δt), x(2Δt); the accelerations follow from the equation of motion.
@@ -199,8 +199,8 @@ impl Stepper for HouboltStepper {
         if let HouboltStart::Given { .. } = self.start {
             self.finish_given(&begin[0], early, rest)?;
         }
-        // The values u = ∇x/Δt and w = ∇²x/Δt² come from the steps themselves, not from differences
-        // of the displacements.
+        // The values u = ∇x/Δt and w = ∇²x/Δt² are computed from the changes in the two steps,
+        // because differences of displacements would lose digits.
         let (x, _, a) = motion(&rest[1], n);
         for i in 0..n {
             let u = changes[1][i] / self.dt;

@@ -35,7 +35,8 @@ pub struct MatrixExponential {
 }
 
 impl MatrixExponential {
-    /// Force held from its sample to the next, as by a digital converter.
+    /// Force that is constant from each sample to the next, as the output of a digital-to-analogue
+    /// converter is.
     pub const HELD: Self = Self { linear: false };
     /// Force linear between samples.
     pub const LINEAR: Self = Self { linear: true };

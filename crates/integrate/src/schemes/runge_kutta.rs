@@ -13,9 +13,11 @@ use crate::system::System;
 /// Force at t + Δt/2 for the two middle stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MidStepForce {
-    /// F(t): first order where the force changes.
+    /// F(t), the force at the start of the step: the scheme is of first order where the force
+    /// changes.
     Held,
-    /// ½ [F(t) + F(t+Δt)]: second order.
+    /// ½ [F(t) + F(t+Δt)], the mean of the forces at the two samples: the scheme is of second
+    /// order.
     Linear,
     /// The force itself, from a function of time or from samples supplied at mid-step
     /// ([`mechid_signal::resample::within_steps`] interpolates them): fourth order.

@@ -11,7 +11,7 @@ use crate::system::System;
 /// A choice in which programs with the same formula may differ; it is printed with every result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Convention {
-    /// Name of the choice.
+    /// Subject of the choice, such as “load” or “start”.
     pub what: &'static str,
     /// The choice that the scheme uses.
     pub choice: &'static str,

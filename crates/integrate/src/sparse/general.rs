@@ -197,7 +197,7 @@ mod tests {
         .unwrap();
         let refused = SparseLu::new(&free, &sizes(&free), u64::MAX).err();
         assert!(matches!(refused, Some(NotFactored::Singular(r)) if r < 1e-15), "{refused:?}");
-        // A row and a column without entries.
+        // A matrix with an empty row and an empty column must be refused.
         let empty = triplets(
             n,
             wide(n, 9.0, 0.0)

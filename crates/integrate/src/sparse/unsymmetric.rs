@@ -69,7 +69,8 @@ impl UnsymmetricPlan {
         2 * self.symbolic.len_val()
     }
 
-    /// Returns the first entry of each column of the factors, and the rows of all columns.
+    /// Returns the index of the first entry of each column of the factors, and the row of every
+    /// entry.
     fn columns(&self) -> Option<(&[usize], &[usize])> {
         match self.symbolic.raw() {
             SymbolicCholeskyRaw::Simplicial(symbolic) => {
@@ -132,8 +133,9 @@ impl UnsymmetricPlan {
         let n = starts.len() - 1;
         let [mut lower, mut upper] = [(); 2].map(|()| vec![0.0; rows.len()]);
         let [mut column, mut row] = [(); 2].map(|()| vec![0.0; n]);
-        // `first` and `next` list the columns that change column k next. For each of these columns,
-        // `at` is the position of its first row from k on.
+        // The earlier columns that change column k are a linked list: `first[k]` is its first
+        // column, and `next[j]` is the column after column j. `at[j]` is the position in `rows` of
+        // the first row ≥ k of column j.
         let [mut first, mut next, mut at] = [vec![NONE; n], vec![NONE; n], vec![0; n]];
         for k in 0..n {
             let entries = starts[k]..starts[k + 1];

@@ -19,10 +19,10 @@ use crate::system::System;
 ///
 /// If M is symmetric and positive definite, and C and K are symmetric and positive semidefinite, no
 /// motion grows. For other systems the largest eigenvalue of the map over a period is searched for
-/// in up to 40 vectors. The steps are those of the average acceleration method, whose motions grow
-/// exactly if those of the system do. If many motions grow or decay at about the same rate, these
-/// vectors may not suffice; the motion is then followed for 20 more periods. Growth that is slow
-/// compared with the period may be missed.
+/// in the space of up to 40 Arnoldi vectors. The steps are those of the average acceleration
+/// method: its motions grow if and only if the motions of the system grow. If many motions grow or
+/// decay at about the same rate, these vectors may not suffice; the motion is then followed for 20
+/// more periods. Growth that is slow compared with the period may be missed.
 ///
 /// ```
 /// use mechid_integrate::growth_per_period;
@@ -142,8 +142,8 @@ mod tests {
     #[test]
     fn what_grows_by_itself_is_found_and_nothing_else() {
         let sampling = Sampling::new(0.01, 200).unwrap();
-        // Damping of all masses, additional damping of one mass, cross-coupled stiffness between
-        // two masses, and whether a motion grows.
+        // Each row has the damping of all masses, the additional damping of one mass, the
+        // cross-coupled stiffness between two masses, and whether a motion grows.
         let machines = [
             (1.0, -60.0, 0.0, true),
             (1.0, -3.0, 0.0, false),

@@ -86,8 +86,8 @@ pub fn critical_step(
     limit_of(scheme, &Fastest::new(system))
 }
 
-/// Returns the steps of [`critical_step`], in s, of several schemes, one for each in their order;
-/// the properties of the system are computed once.
+/// Returns the step of [`critical_step`], in s, for each of several schemes, in the order of
+/// `schemes`; the properties of the system are computed once.
 ///
 /// # Errors
 /// The errors of [`critical_step`].

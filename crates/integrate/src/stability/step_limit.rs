@@ -24,7 +24,7 @@ pub(crate) struct Examined<'a> {
 /// Function of a scheme that prepares a step of a given size for a system.
 type Prepare<'a> = dyn Fn(&dyn System, f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
 
-/// Returns the dense system, if it is small enough for its whole amplification matrix.
+/// Returns the dense system, if it is small enough to compute its whole amplification matrix.
 fn small_dense(system: &dyn System) -> Option<&SecondOrderSystem> {
     match system.matrices() {
         Matrices::Dense(dense) if dense.dof() <= limits::AMPLIFICATION_DOF => Some(dense),
@@ -41,7 +41,8 @@ impl Examined<'_> {
         stepper: &mut dyn Stepper,
     ) -> Result<(), IntegrateError> {
         let known = self.stable_steps != StableSteps::Unknown;
-        // For one or two degrees of freedom, the computation with the whole matrix is the fastest.
+        // For one or two degrees of freedom, the growth from the whole amplification matrix takes
+        // less time to compute than the proof that the system is passive.
         let passive = known && system.dof() > 2 && passive::is_passive(system);
         if passive && self.is_known_stable(system, dt) {
             return Ok(());
@@ -187,7 +188,8 @@ impl Examined<'_> {
         self.search(&radius, fastest, factor, 4.0 * f64::EPSILON)
     }
 
-    /// Returns the step, to `precision`, above which the spectral radius is not tolerated.
+    /// Returns the step at which the spectral radius first exceeds the tolerated value, to the
+    /// relative `precision`; `None` if there is no such step.
     fn search(
         &self,
         radius: &dyn Fn(f64) -> Result<Option<f64>, IntegrateError>,

@@ -64,7 +64,7 @@ struct ForceHistory {
 impl Collocations {
     /// Creates the maps of `scheme` for a step of `dt` seconds, if the system is small enough, all
     /// nonlinear forces act on the same degree of freedom, and the step is short compared with
-    /// every period.
+    /// every natural period.
     pub(crate) fn from_scheme(scheme: &dyn Scheme, system: &dyn System, dt: f64) -> Option<Self> {
         let forces = system.nonlinear_forces();
         let &[dof] = forces.first()?.dofs() else { return None };
@@ -338,8 +338,8 @@ impl Probe {
         self.state().unit = Some(unit);
     }
 
-    /// Returns the instants and motions of the evaluations since the last call, collocation by
-    /// collocation.
+    /// Returns the instant and the motion of each evaluation of the force since the last call, one
+    /// entry per collocation.
     fn take_evaluations(&self) -> Vec<Asked> {
         std::mem::take(&mut self.state().asked)
     }

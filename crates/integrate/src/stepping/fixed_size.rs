@@ -10,14 +10,15 @@ use crate::stepping::transition::Transition;
 #[derive(Debug)]
 pub(crate) struct FixedSize {
     one: Transition,
-    /// Two steps at once, if both together are short compared with every period. Each step has to
-    /// wait for the result of the step before; two steps at once halve this waiting time.
+    /// Transition over two steps, if two steps are short compared with every natural period. Each
+    /// step has to wait for the result of the step before; two steps at once halve this waiting
+    /// time.
     two: Option<Transition>,
 }
 
 impl FixedSize {
     /// Returns the transition of `stepper` for a step of `dt` seconds, if its system is small
-    /// enough and the step is short compared with every period.
+    /// enough and the step is short compared with every natural period.
     pub(crate) fn from_stepper(stepper: &mut dyn Stepper, dt: f64) -> Option<Self> {
         let n = stepper.dof();
         if n > limits::FIXED_SIZE_DOF {
@@ -100,8 +101,8 @@ impl FixedSize {
     }
 }
 
-/// Returns whether `factor` steps of `dt` are short compared with every period: (ωΔt)² is below
-/// about 1.
+/// Returns whether `factor` steps of `dt` are short compared with every natural period: (ωΔt)² is
+/// below about 1.
 ///
 /// The entries of D are rounded once and are of the order of (ωΔt)². Above this limit their
 /// rounding would make an undamped motion grow or decay by up to ε in every step. The stepper

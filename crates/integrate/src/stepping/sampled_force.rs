@@ -88,7 +88,8 @@ impl<'a> ForceTable<'a> {
         Ok(Self { samples, mid_step, after, forced: None, dof })
     }
 
-    /// Returns the same force on the degrees of freedom `forced` of `dof`, one for each channel.
+    /// Returns the same force for a system with `dof` degrees of freedom; channel c acts on degree
+    /// of freedom `forced[c]`.
     pub(crate) fn acting_on(self, forced: &'a [usize], dof: usize) -> Self {
         Self { forced: Some(forced), dof, ..self }
     }

@@ -172,8 +172,8 @@ impl Simulation {
         self.stepper.as_mut()
     }
 
-    /// Takes steps `from .. to` and writes the motion at samples `from + 1 ..= to` as far as
-    /// `motion` has them.
+    /// Takes steps `from .. to` and writes the motion at those of the samples `from + 1 ..= to`
+    /// that `motion` has.
     pub(crate) fn advance(
         &mut self,
         table: &ForceTable<'_>,

@@ -1,4 +1,5 @@
-//! The linear map of one step, from unit states and unit loads of the stepping code.
+//! The linear map of one step; its matrices are obtained by running the stepping code with unit
+//! states and unit loads.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector};
@@ -75,9 +76,9 @@ impl Transition {
         }
     }
 
-    /// Scales `matrix`, a D or an A, to comparable rows and columns by powers of two, and returns
-    /// the scales s of z = s ∘ (balanced z). `None` if entries are too large for their squares to
-    /// be finite, because balancing would then not end.
+    /// Scales `matrix`, the D or the amplification matrix A of a step, to comparable rows and
+    /// columns by powers of two, and returns the scales s of z = s ∘ (balanced z). `None` if
+    /// entries are too large for their squares to be finite, because balancing would then not end.
     pub(crate) fn balance(matrix: &mut DMatrix<f64>) -> Option<DVector<f64>> {
         let representable = matrix.iter().all(|v| v.abs() < 1e150);
         representable.then(|| balance_parlett_reinsch(matrix))

@@ -41,7 +41,8 @@ fn printed_newmark(alpha: f64, delta: f64, zeta: f64, w: f64) -> Matrix3<f64> {
     ])
 }
 
-/// Wilson's matrix as printed.
+/// Returns the amplification matrix of Wilson's scheme as Bathe (1982) prints it, in the order of
+/// [`reordered`].
 fn printed_wilson(theta: f64, zeta: f64, w: f64) -> Matrix3<f64> {
     let b = 1.0 / (theta / (w * w) + zeta * theta * theta / w + theta.powi(3) / 6.0);
     let k = zeta * b / w;
@@ -107,7 +108,8 @@ fn houbolt_steps_like_the_printed_row() {
         let mut change = [0.0; 4];
         stepper.change(&state, &loads, &mut change).unwrap();
         assert!((xs[0] + change[0] - printed).abs() < 1e-13, "{zeta} {w}");
-        // Velocity and acceleration are the printed differences of the new displacements.
+        // The velocity and the acceleration must be the printed differences of the new
+        // displacements.
         let x = [printed, xs[0], xs[1], xs[2]];
         let v = (11.0 * x[0] - 18.0 * x[1] + 9.0 * x[2] - 2.0 * x[3]) / (6.0 * dt);
         let a = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / (dt * dt);
@@ -175,7 +177,7 @@ fn anchors_at_ten_steps_per_period() {
     let houbolt = Houbolt::default();
     let wilson = WilsonTheta::new(1.4).unwrap();
     let central = CentralDifference::default();
-    // The elongations in per cent are known to four decimals.
+    // The expected period elongations are given in per cent, to four decimals.
     for (scheme, elongation) in [
         (&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, 3.2075),
         (&Newmark::LINEAR_ACCELERATION, 1.6002),
@@ -270,7 +272,8 @@ fn the_spectral_radius_at_large_steps_is_the_parameter() {
         }
         for scheme in schemes {
             let found = far(scheme.as_ref());
-            // A triple root has an error of the size of the cube root of ε, and of 1/Ω².
+            // Rounding moves a triple root by about the cube root of ε; the finite step moves it by
+            // about the cube root of 1/Ω².
             assert!((found - rho).abs() < 1e-4, "{}: {found}", scheme.name());
         }
     }

@@ -5,7 +5,7 @@ use mechid_model::{InitialState, Response, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
-/// Every scheme in every convention that works on samples alone, in any number of degrees of freedom.
+/// Returns every scheme, in each convention that needs the force only at its samples.
 pub fn schemes() -> Vec<Box<dyn Scheme>> {
     let wilson = WilsonTheta::new(1.4).unwrap();
     vec![

@@ -264,7 +264,8 @@ fn bathe_is_the_printed_composite() {
 fn the_matrix_exponential_is_the_exact_response() {
     for dof in [1, 2, 5, 20] {
         let system = mechid_problems::random_stable(dof, 11);
-        // Steps up to some periods of the fastest motion.
+        // The steps range from a small fraction of the period of the fastest motion to several of
+        // these periods.
         for dt in [1e-4, DT, 0.3] {
             let force = force(Sampling::new(dt, LEN).unwrap(), dof);
             let start = moving(dof);

@@ -53,7 +53,7 @@ fn responses_superpose() {
 fn the_displacement_alone_is_that_of_the_whole_response() {
     for dof in [1, 2, 5] {
         let system = mechid_problems::random_stable(dof, 2);
-        // Odd and even numbers of steps, also a record without a step.
+        // The numbers of steps are odd and even; a record of one sample has no step.
         for len in [1, 2, 3, 64, 65] {
             let force = force(Sampling::new(1e-3, len).unwrap(), dof);
             for scheme in schemes() {
@@ -181,7 +181,8 @@ fn a_diagonal_system_is_its_single_degrees_of_freedom() {
             .unwrap();
             let alone = integrate(scheme, &single.system(), &one, &start).unwrap();
             let column = owned(&all).map(|p| p.columns(c, 1).into_owned());
-            // The responses differ by the rounding of 400 steps; the second oscillator is undamped.
+            // The responses may differ only by the rounding errors of 400 steps. In the second
+            // oscillator, which is undamped, these errors do not decay.
             assert!(distance(column, &alone) < 1e-11, "{} channel {c}", scheme.name());
         }
     }
@@ -227,8 +228,9 @@ fn modes_may_be_integrated_one_by_one() {
     }
 }
 
-/// The force is a flat Schroeder multisine that begins at different samples of its period and is
-/// linear between samples. The response is compared with the exact response to this force.
+/// On each channel the force is a flat Schroeder multisine, which begins at a different sample of
+/// its period and is linear between samples. The response is compared with the exact response to
+/// this force.
 #[test]
 fn small_steps_approach_the_exact_discretisation() {
     let len = 64;

@@ -100,7 +100,7 @@ fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
     near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
     near.truncate(5);
     assert_same(&sparse_modes(&sparse, ModeSearch::NearOmega(omega), 5).unwrap(), &near);
-    // All modes of a small system.
+    // A search for more modes than a small system has must return all its modes.
     let dense = rotor(3);
     let all = dense.modes().unwrap();
     let found = sparse_modes(&SparseSystem::from(&dense), ModeSearch::Lowest, 20).unwrap();
@@ -198,14 +198,16 @@ fn what_cannot_be_searched_is_refused() {
         assert!(matches!(refused, IntegrateError::SearchFrequency { .. }), "{refused}");
     }
     assert_eq!(sparse_modes(&system, ModeSearch::Lowest, 0).unwrap(), []);
-    // One undamped oscillator, searched at its natural frequency.
+    // A search exactly at the natural frequency of an undamped oscillator must be refused, because
+    // the shifted matrix is singular.
     let one = || lumped(&[4.0]);
     let system = SparseSystem::new(lumped(&[1.0]), lumped(&[0.0]), one()).unwrap();
     let refused = sparse_modes(&system, ModeSearch::NearOmega(2.0), 1).unwrap_err();
     assert!(matches!(refused, IntegrateError::SingularShift { .. }), "{refused}");
 }
 
-/// A cube of masses: because of its symmetry, many frequencies occur three or six times.
+/// The ten lowest frequencies of a cube of masses must agree with the closed form. Because the cube
+/// is symmetric, many of its frequencies occur three or six times.
 #[test]
 fn a_cube_has_the_frequencies_of_its_closed_form() {
     let w = 8;
@@ -314,8 +316,9 @@ fn modes_near_a_frequency_are_found_beside_the_floor() {
     }
 }
 
-/// A grounded chain, a mass that is free to drift, and an overdamped mass of little stiffness. The
-/// modes of the two single masses are found from one shift, the modes of the chain from another.
+/// The system is a grounded chain, a mass that is free to drift, and an overdamped mass with little
+/// stiffness. One shift finds the modes of the two single masses, and another shift those of the
+/// chain; all modes must agree with their closed forms.
 #[test]
 fn modes_far_below_the_floor_come_first() {
     let n = 4000;

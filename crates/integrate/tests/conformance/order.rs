@@ -47,7 +47,8 @@ fn errors(scheme: &dyn Scheme, initial: &InitialState, steps: usize) -> [f64; 3]
     std::array::from_fn(|i| (got[i].row(steps).transpose() - &truth[i]).norm() / truth[i].norm())
 }
 
-/// Slopes of ln(error) over ln(Δt) between two halvings.
+/// Returns the orders of convergence of x, ẋ and ẍ: the slope of ln(error) over ln(Δt) from a step
+/// to a quarter of this step.
 fn orders(scheme: &dyn Scheme, initial: &InitialState, steps: usize) -> [f64; 3] {
     let (coarse, fine) = (errors(scheme, initial, steps), errors(scheme, initial, 4 * steps));
     std::array::from_fn(|i| (coarse[i] / fine[i]).log2() / 2.0)

@@ -10,8 +10,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::common::*;
 
-/// The steady state of the scheme's recurrence line by line: (e^{iωΔt} I − A) Z = Σ B e^{iωτ} F,
-/// with direct sums for the Fourier transforms.
+/// Returns the steady state of the scheme's recurrence, computed for each spectral line: (e^{iωΔt}
+/// I − A) Z = Σ B e^{iωτ} F, with direct sums for the Fourier transforms.
 fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> [DMatrix<f64>; 3] {
     let (len, n) = (force.len(), force.channels());
     let dt = force.sampling().dt();
@@ -148,8 +148,8 @@ fn waiting_gives_the_same() {
 
 #[test]
 fn a_response_at_resonance_still_closes() {
-    // The frequency of central difference is 2 sin(θ/2)/Δt; it is placed on line 3 of 64, with ζ =
-    // 1e-9.
+    // With central difference, an oscillator with ω = 2 sin(θ/2)/Δt oscillates by the angle θ per
+    // step. Here θ = 2π·3/64, so that the resonance is on line 3 of 64; ζ = 1e-9.
     let (dt, len) = (0.01, 64);
     let omega = 2.0 / dt * (std::f64::consts::PI * 3.0 / 64.0).sin();
     let system = Sdof::from_modal(1.0, 1e-9, omega).unwrap().system();
@@ -163,8 +163,8 @@ fn a_response_at_resonance_still_closes() {
     let closed = x.channel(0)[end] + dt * half_step;
     assert!((closed - x.channel(0)[0]).abs() < 1e-12 * x.column(0).amax());
     // The line at resonance has the amplitude F/(c ω'), where ω' = sin θ/Δt is the ratio of v to x.
-    // Because of the rounding of K, only about seven digits of the damping ratio of 1e-9 are known;
-    // the other lines add 1e-8.
+    // Because K is rounded, only about seven digits of the damping ratio of 1e-9 are known. The
+    // other lines add about 1e-8 of this amplitude.
     let seen = (std::f64::consts::TAU * 3.0 / 64.0).sin() / dt;
     let expected = 1.0 / (2e-9 * omega * seen);
     assert!((x.column(0).amax() / expected - 1.0).abs() < 1e-5);

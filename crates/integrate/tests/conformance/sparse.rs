@@ -1,4 +1,4 @@
-//! Sparse systems against the same systems with dense matrices.
+//! Comparison of sparse systems with the same systems in dense matrices.
 
 use mechid_integrate::*;
 use mechid_model::{

@@ -77,8 +77,8 @@ fn a_long_chain_is_refused_just_beyond_the_limit() {
                     _ => 8_f64.sqrt() / highest(n),
                 };
                 assert!(scheme.prepare(&chain, 0.999 * limit).is_ok(), "{name} n {n}");
-                // Damping proportional to K increases the limit of schemes with γ > ½ by some per
-                // cent.
+                // A step 5 % above the limit must be refused, and the reported limit must agree
+                // with the closed form.
                 match scheme.prepare(&chain, 1.05 * limit).err() {
                     Some(IntegrateError::Unstable { critical_step: Some(said), .. }) => {
                         let gap = said / limit - 1.0;
@@ -133,7 +133,8 @@ fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
 fn growth_of_its_own_is_no_instability_of_the_scheme() {
     let n = 60;
     let shaft = band(2 * n, &[(-2, -900.0), (0, 1900.0), (2, -900.0)]);
-    // Cross-coupling at one bearing: planes x and y alternate.
+    // The cross-coupling acts at one bearing. Even degrees of freedom are in plane x, odd degrees
+    // of freedom in plane y.
     let film = triplets(2 * n, [(0, 1, 300.0), (1, 0, -300.0)]).unwrap();
     let whirling =
         SparseSystem::new(band(2 * n, &[(0, 1.0)]), &shaft * 1e-5, shaft + film).unwrap();

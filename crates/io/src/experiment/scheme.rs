@@ -172,7 +172,7 @@ pub enum FirstDisplacements {
     /// Taylor step with the consistent acceleration.
     #[default]
     Taylor,
-    /// The displacement of the first sample: the system is at rest before it.
+    /// The displacement of the first sample: the system is at rest before the first sample.
     Rest,
 }
 

@@ -94,7 +94,8 @@ impl ExperimentStudy {
         description: Value,
         runs: &StudyRuns,
     ) -> Result<Self, IoError> {
-        // Errors of the description itself are reported without a run.
+        // An error that the description has in every run is reported here, without the number of a
+        // run.
         let experiment: Experiment = json::deserialized(&file, description.clone())?;
         let refused = |what: String| IoError::Description { file: file.clone(), what };
         let fields = match runs {
@@ -184,8 +185,9 @@ fn fields(table: &Table) -> Result<Vec<StudyField>, IoError> {
     columns.iter().map(field).collect()
 }
 
-/// Returns the value of a field, by its path. The description may lack the last name of the path,
-/// such as an optional field; the reader of the experiment refuses a field that does not exist.
+/// Returns the value of a field, by its path. If an object of the description lacks only the last
+/// name of the path, this name is added with the value null, because it may be an optional field.
+/// If there is no such field, the reader of the experiment refuses it.
 fn field_value<'a>(description: &'a mut Value, path: &str) -> Option<&'a mut Value> {
     let (parents, last) = path.rsplit_once('.').map_or((None, path), |(p, l)| (Some(p), l));
     let mut parent = description;

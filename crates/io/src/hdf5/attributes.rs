@@ -4,8 +4,8 @@ use hdf5_pure::{AttrValue, Dataset, Group};
 
 use crate::labels::states_unit;
 
-/// Names, in lower case, of an attribute that multiplies the stored numbers: in netCDF and in
-/// NeXus.
+/// Names, in lower case, of the attribute whose value multiplies the stored numbers: the first name
+/// in netCDF, the second in NeXus.
 const FACTORS: [&str; 2] = ["scale_factor", "scaling_factor"];
 
 /// Name, in lower case, of the attribute whose value is added to the stored numbers after they are
@@ -62,8 +62,8 @@ impl Attributes {
         Self(values)
     }
 
-    /// Returns the numbers with their names, without the attributes that MATLAB writes for its own
-    /// use.
+    /// Returns the attributes that are numbers, with their names, without the attributes that
+    /// MATLAB writes for its own use.
     pub fn numbers(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().filter_map(|(name, value)| match value {
             Value::Number(number) if !name.starts_with("MATLAB") => Some((name.as_str(), *number)),

@@ -78,7 +78,7 @@ impl Reader {
         Ok(reader.contents)
     }
 
-    /// Returns the sign between the names of a group and its members.
+    /// Returns the character between the name of a group and the name of a member in a path.
     fn separator(&self) -> char {
         if self.is_matlab { '.' } else { '/' }
     }
@@ -185,7 +185,7 @@ impl Reader {
     fn content(&mut self, dataset: &Dataset, attributes: &Attributes) -> Result<Content, Trouble> {
         let scaling = attributes.scaling().map_err(Trouble::Unusable)?;
         let (len, budget) = (self.len, &mut self.budget);
-        // A panic of the decoder concerns only this data set.
+        // A panic of the decoder makes only this data set unusable, not the whole file.
         let read =
             catch_unwind(AssertUnwindSafe(|| values::read(dataset, attributes, len, budget)));
         let damaged = |_| Err(Trouble::Unusable("data that cannot be read (damaged)".into()));

@@ -1,8 +1,8 @@
 //! Timetables among the objects of MATLAB 7.3.
 //!
-//! A variable of a class holds the number of its object. A table of integers that all variables
-//! share, `#subsystem#/MCOS`, lists the properties of the objects; the other cells of `MCOS` are
-//! the values of these properties.
+//! A variable of a class holds only the number of its object. All variables share the cell array
+//! `#subsystem#/MCOS`. Its first cell is a table of integers that lists the properties of the
+//! objects; later cells are the values of these properties.
 //!
 //! # Source
 //! The format is not published; after the description and the writer of the package `mat-io` 1.0.

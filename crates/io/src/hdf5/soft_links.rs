@@ -31,7 +31,7 @@ const UNDEFINED: [u8; 8] = [0xff; 8];
 /// Kind of an entry that is a soft link.
 const SOFT_LINK: [u8; 4] = 2_u32.to_le_bytes();
 
-/// Removes the soft links from the groups of a file, which have addresses of eight bytes.
+/// Removes the soft links from the groups of a file whose addresses have eight bytes.
 pub(super) fn remove(bytes: &mut [u8]) {
     let nodes: Vec<usize> = memmem::find_iter(bytes, START).collect();
     for node in nodes {

@@ -109,7 +109,8 @@ fn array(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Array, Trou
     if count == 0 {
         return unusable("an empty array");
     }
-    // Each number uses eight bytes in memory, and a chunk is unpacked as a whole.
+    // Each number uses eight bytes in memory. A chunk is unpacked as a whole, so one chunk must
+    // also fit into the remaining budget.
     take_numbers(count, element_bytes, len, budget).map_err(Trouble::Fault)?;
     if let Some(chunk) = dataset.chunk_shape().map_err(cannot_be_read)? {
         let numbers = chunk.iter().try_fold(1_u64, |product, len| product.checked_mul(*len));
@@ -203,7 +204,8 @@ impl CompoundType for Pair {
 
 /// Reads complex numbers.
 fn complex(dataset: &Dataset, len: u64, budget: &mut Budget) -> Result<Content, Trouble> {
-    // During decoding, the stored bytes need memory in addition to the numbers.
+    // A complex number counts as four numbers, because during decoding the stored bytes need memory
+    // in addition to the two numbers.
     let lengths = lengths(dataset, 4, len, budget)?;
     let pairs = dataset.read_compound::<Pair>();
     let pairs = pairs.map_err(|error| {
@@ -222,7 +224,7 @@ pub(super) fn references(
     len: u64,
     budget: &mut Budget,
 ) -> Result<Content, Trouble> {
-    // An open object needs far more memory than a number.
+    // Every object is opened, and an open object needs far more memory than a number.
     let lengths = lengths(dataset, OBJECT_NUMBERS, len, budget)?;
     for _ in 0..lengths.iter().product() {
         budget.take_column().map_err(|limit| Trouble::Fault(Fault::too_large(0, limit)))?;

@@ -75,7 +75,7 @@ impl Array {
         };
         let class = flags & 0xff;
         if class > 15 {
-            // Objects have no size in this format: their name comes next.
+            // An object of this format has no element with its dimensions: its name comes next.
             let name = text(elements.required("name")?.data);
             return Ok(Self { name, value: Value::Other(object(&mut elements)) });
         }
@@ -103,7 +103,8 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
     };
     let lengths = lengths.ok_or_else(|| Fault::new(size.at, "a variable has no size"))?;
     let length = |value: &f64| {
-        // An f64 represents every u32 exactly, and no file can have a longer dimension.
+        // An f64 represents every u32 exactly, and no file can have a dimension longer than
+        // `u32::MAX`.
         let whole = (0.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
         whole.then_some(*value as usize).ok_or_else(|| {
             Fault::new(
@@ -272,7 +273,7 @@ fn structs(
     let count = lengths.iter().try_fold(1_usize, |product, len| product.checked_mul(*len));
     match count {
         Some(1) => fields(budget),
-        // Structs without fields have no contents, so their number needs no memory.
+        // Structs without fields have no contents, so any number of them needs no memory.
         _ if names.is_empty() => Ok(Value::Other("nothing")),
         Some(count) => {
             let mut structs = Vec::new();
@@ -281,7 +282,7 @@ fn structs(
             }
             Ok(Value::Elements { kind: "an array of structs", elements: structs })
         }
-        None => Err(Fault::new(at, "an array of structs has no size")),
+        None => Err(Fault::new(at, "an array of structs has too many elements")),
     }
 }
 

@@ -10,8 +10,8 @@ use ::parquet::file::reader::ChunkReader;
 
 use super::thrift::Bytes;
 
-/// Maximum depth of nested groups in a schema; deeper ones are refused as forged. Columns of
-/// numbers and lists of them have two levels.
+/// Maximum depth of nested groups in a schema; deeper schemas are refused as forged. A table of
+/// numbers has one level, its root; a column of lists has three.
 const GROUP_DEPTH: usize = 64;
 
 /// Number of bytes at the end of a file: length of the footer, and magic word.

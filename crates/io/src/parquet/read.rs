@@ -71,7 +71,8 @@ pub fn read_parquet_metadata(path: impl AsRef<Path>) -> Result<Vec<(String, Stri
 pub(super) enum Trouble {
     /// The file contradicts itself.
     Damaged(String),
-    /// Number of rows that were read before, and the limit that the file exceeds.
+    /// Number of rows that were read before the reading stopped, and the limit that the file
+    /// exceeds.
     TooLarge(usize, Limit),
 }
 
@@ -297,7 +298,8 @@ impl<R: ChunkReader + 'static> Columns<R> {
     }
 }
 
-/// Readers of the row groups, created once because creating one takes time for each of its columns.
+/// Readers of the row groups. Each reader is created only once, because its creation takes time for
+/// each column.
 pub(super) struct Groups<'a> {
     reader: &'a dyn FileReader,
     known: Vec<OnceCell<Box<dyn RowGroupReader + 'a>>>,

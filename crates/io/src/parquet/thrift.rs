@@ -22,7 +22,7 @@ impl Bytes<'_> {
         Some(self.take(1)?[0])
     }
 
-    /// Reads an unsigned number of 7 bits a byte, the lowest first.
+    /// Reads an unsigned number, stored with 7 bits in each byte, the lowest bits first.
     fn varint(&mut self) -> Option<u64> {
         let mut value = 0;
         for shift in (0..64).step_by(7) {

@@ -44,7 +44,7 @@ pub(super) enum BadRow {
 pub(super) struct Batch {
     /// Number of samples.
     pub samples: usize,
-    /// Numbers of the wanted columns; an unusable column has fewer than `samples`.
+    /// Numbers of the wanted columns; an unusable column has fewer than `samples` numbers.
     pub columns: Vec<Vec<f64>>,
     /// Reason why a wanted column cannot be used.
     pub unusable: Vec<Option<Unusable>>,
@@ -206,7 +206,7 @@ impl Batch {
         is_plain
     }
 
-    /// Reads any field of a wanted column.
+    /// Reads a field of a wanted column; a field that cannot be used is added to `faults`.
     fn field(&mut self, plan: &Plan, line: u64, column: usize, field: &[u8]) {
         if self.unusable[column].is_some() {
             return;

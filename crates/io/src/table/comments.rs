@@ -122,7 +122,8 @@ impl Comments {
         self.lines[line].fields.clone()
     }
 
-    /// Returns the units of the columns, one text for each line with units except the line `names`.
+    /// Returns one list of units for each comment line except the line `names`; a list has one text
+    /// per column, empty for a column without a unit.
     pub fn units(&self, names: Option<usize>) -> impl Iterator<Item = Vec<String>> {
         let without_names = self.lines.iter().enumerate().filter(move |(at, _)| Some(*at) != names);
         without_names.map(|(_, line)| units_of(&line.fields, line.are_units))
@@ -192,7 +193,7 @@ impl CommentLine {
         let (fields, by_blanks) = fields_of(names.or(units).unwrap_or(text), widths, layout)?;
         // Words in the definition of one column are not the names of all columns.
         (!by_blanks || !is_numbered_with_unit(text)).then_some(())?;
-        // Words of a sentence may be units, too: `sampled in s`.
+        // Most words of a sentence may look like units: `in` and `s` in `sampled in s`.
         let are_all_units = || fields.iter().all(|field| are_units(std::slice::from_ref(field)));
         let seem_units = are_units(&fields) && (is_adjacent || !by_blanks || are_all_units());
         Some(Self { are_units: units.is_some() || seem_units, fields, is_adjacent })

@@ -66,7 +66,8 @@ impl Definitions {
         widths.contains(&names.len()).then_some(names)
     }
 
-    /// Returns the texts for units of the columns with these names, empty for a column without one.
+    /// Returns the texts for units of the columns with these names, empty for a column without a
+    /// unit.
     pub fn units(&self, names: &[String]) -> Vec<String> {
         let unit = |name: &String| {
             let [bare, other] = names_without_unit(name);
@@ -108,9 +109,9 @@ impl Definition {
         has_words.then(|| Self { key, text: text.into() })
     }
 
-    /// Returns the text of the unit, read as in a header that consists of the name and the text. It
-    /// is empty if there is no unit, or only the unit of a range or a sensitivity (`5 kN`,
-    /// `10 mV/g`).
+    /// Returns the text of the unit that the definition states, read as a header with the name and
+    /// the text of the definition. The result is empty if the definition has no unit, or only the
+    /// unit of a range or a sensitivity (`5 kN`, `10 mV/g`).
     fn unit(&self) -> String {
         let text = match &self.key {
             Key::Name(name) => format!("{name} {}", self.text),

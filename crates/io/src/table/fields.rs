@@ -30,7 +30,7 @@ pub(crate) struct Row<'a> {
     pub is_quoted: bool,
 }
 
-/// Iterator over the rows of a text that begins with a row.
+/// Iterator over the rows of a text; the first byte of the text begins a row.
 #[derive(Debug, Clone)]
 pub(crate) struct RowIter<'a> {
     text: &'a [u8],

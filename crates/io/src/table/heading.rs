@@ -16,8 +16,8 @@ const MIN_NUMBERS: usize = 2;
 /// Texts above the rows of numbers.
 #[derive(Debug, Default)]
 pub(super) struct Above {
-    /// Names and units; `None` if the first row of the table has the names and perhaps the second
-    /// row the units, or if there are no names.
+    /// Names and units; `None` if there are no names, or if the names are in the first row of the
+    /// table (the units may then be in the second row).
     pub heading: Option<Heading>,
     /// Further texts for the units of the columns, from comments and other rows. Each list has one
     /// text per column, empty for a column without a unit.
@@ -74,8 +74,8 @@ struct Filled {
 impl Filled {
     /// Counts the fields of a table below the rows `above`.
     ///
-    /// There may be one more name than there are fields: in all rows the last field is missing, or
-    /// in all but the first row, whose extra field is a comment.
+    /// There may be one more name than there are fields in a row. Either all rows lack the last
+    /// field, or only the first row has it, as a comment.
     fn new(above: &[Beginning<'_>], table: &[Beginning<'_>]) -> Self {
         let first = table[0].fields.filled();
         let smallest = table[1..].iter().map(|row| row.fields.filled()).min().unwrap_or(first);
@@ -242,7 +242,7 @@ impl NamesAndUnits {
         Some(Self { names, units: units.filter(|units| *units != names) })
     }
 
-    /// Returns the units in the rows other than the rows of names and units.
+    /// Returns the units in further rows above the table: all rows except `names` and `units`.
     fn further_units(&self, above: &[Beginning<'_>], layout: Layout) -> Vec<Vec<String>> {
         let is_other = |at: &usize| *at != self.names && Some(*at) != self.units;
         let others = (0..above.len()).filter(is_other).map(|at| &above[at]);

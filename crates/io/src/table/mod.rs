@@ -248,7 +248,8 @@ impl Table {
         &self.names
     }
 
-    /// Returns the description of a column in addition to its name, by its index counted from 0.
+    /// Returns the description of the column with index `column` (from 0): the text that the file
+    /// gives in addition to the name of the column, or an empty text.
     ///
     /// # Panics
     /// If there is no such column.
@@ -256,8 +257,8 @@ impl Table {
         &self.contents.columns[column].about
     }
 
-    /// Returns the text for the unit of a column in a line of units, a label or an attribute, by
-    /// its index; empty if there is none.
+    /// Returns the text for the unit of the column with index `column`, from a line of units, a
+    /// label or an attribute; empty if there is no such text.
     pub(crate) fn unit_text(&self, column: usize) -> &str {
         &self.contents.columns[column].unit
     }
@@ -414,8 +415,8 @@ impl Table {
         time_unit::doubtful(&self.contents.columns[column])
     }
 
-    /// Returns the first column that is called time but states a unit of another quantity, with the
-    /// text of that unit.
+    /// Returns the first column that is called time but states a text that cannot be read as a unit
+    /// of time, with this text.
     pub fn unclear_time(&self) -> Option<(usize, String)> {
         (0..self.width()).find_map(|at| {
             let column = &self.contents.columns[at];
@@ -555,8 +556,8 @@ impl Table {
         self.signal(Record::new(sampling, data))
     }
 
-    /// Returns the indices of the columns `wanted`; an error if a column is used twice, also as the
-    /// time column.
+    /// Returns the indices of the columns `wanted`; an error if a column is wanted twice, or is
+    /// also the time column.
     fn record_columns(
         &self,
         time: &TimeAxis<'_>,
@@ -621,7 +622,7 @@ impl Table {
     }
 
     /// Returns the name of a column for results, by its index counted from 0: without its unit,
-    /// with control characters escaped; `column 2` if it has none.
+    /// with control characters escaped; `column 2` if the column has no name.
     ///
     /// # Panics
     /// If there is no such column.

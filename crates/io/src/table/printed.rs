@@ -14,8 +14,9 @@ const FEW: usize = 16;
 /// Maximum deviation of instants from equal spacing, in addition to their rounding, in steps.
 const SLACK: f64 = 0.01;
 
-/// Maximum number of corners of an envelope; with more, the instants are on a curve: for rounded
-/// instants the number of corners grows only with the cube root of their number.
+/// Maximum number of corners of an envelope. If there are more corners, the instants are on a
+/// curve, because rounding creates few corners: their number grows with the cube root of the number
+/// of instants.
 const MOST_CORNERS: usize = 1 << 16;
 
 /// Number of digits of a double; rounding to more digits is not visible.
@@ -52,8 +53,8 @@ pub(super) struct PrintedInstants {
     intervals: Intervals,
 }
 
-/// Intervals that contain the true values of the instants; a straight line over the number of the
-/// instant should pass through all of them.
+/// Intervals that contain the true values of the instants. For equally spaced instants, a straight
+/// line passes through all intervals, plotted over the numbers of the instants.
 #[derive(Debug, Clone, Default)]
 struct Intervals {
     /// Corners of the concave envelope of the lower ends of the intervals.
@@ -87,13 +88,13 @@ impl Intervals {
         others.upper_ends.iter().for_each(|corner| add_corner(&mut self.upper_ends, *corner));
     }
 
-    /// Returns by how much all intervals together would have to grow for a straight line to pass
-    /// through them; zero or less if a line already does.
+    /// Returns by how much each interval would have to be longer for one straight line to pass
+    /// through all intervals; zero or less if such a line already exists.
     fn overlap(&self) -> f64 {
         if self.is_curved {
             return f64::INFINITY;
         }
-        // The sum of two concave polygons is largest at a corner of one of the polygons.
+        // The sum of two concave, piecewise linear envelopes is largest at a corner of one of them.
         let at_corners = |corners: &[Corner], others: &[Corner]| {
             let mut from = 0;
             let mut largest = f64::NEG_INFINITY;
@@ -115,7 +116,7 @@ impl Intervals {
 /// Adds a point after all corners of a concave envelope.
 fn add_corner(corners: &mut Vec<Corner>, point: Corner) {
     while let [.., a, b] = corners[..] {
-        // The middle point is below the chord of its neighbours.
+        // The middle point is a corner only if it is above the line through its neighbours.
         if (b.1 - a.1) * (point.0 - a.0) > (point.1 - a.1) * (b.0 - a.0) {
             break;
         }
@@ -202,7 +203,8 @@ impl PrintedInstants {
         0.5 * self.coarser(time, unit) + f64::EPSILON * (time.abs() + self.first.abs())
     }
 
-    /// Returns the larger of the unit of an instant and the unit of single precision.
+    /// Returns the rounding unit of an instant: `unit`, or the rounding unit of single precision if
+    /// it is larger and all instants are single-precision numbers.
     fn coarser(&self, time: f64, unit: f64) -> f64 {
         if self.is_single { unit.max(single_unit(time)) } else { unit }
     }
@@ -339,7 +341,8 @@ mod tests {
             times.remove(gap);
             assert!(!uniform(times), "{gap}");
         }
-        // The clock runs faster by a hundredth of a per cent in the second half.
+        // In the second half, each step is longer by 0.01 %, so the instants are not equally
+        // spaced.
         let drift = |k: usize| (k as f64 + 1e-4 * k.saturating_sub(50_000) as f64) / 25_600.0;
         assert!(!uniform((0..100_000).map(|k| format!("{:.6}", drift(k)).parse().unwrap())));
         // Instants with four decimal places are too coarse to distinguish a missing sample from

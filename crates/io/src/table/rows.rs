@@ -36,8 +36,8 @@ pub(super) struct Rows {
     lines: Lines,
     /// Header of a LabVIEW measurement file.
     lvm: Option<LvmHeader>,
-    /// Units in comments and further rows, one list per comment or row, until they are added to the
-    /// units of the columns.
+    /// Units that comments and rows above the table state in addition to the row of units, one list
+    /// per comment or row. They are kept here until they are added to the units of the columns.
     further_units: Vec<Vec<String>>,
     /// Remarks on comments that were not read.
     remarks: Vec<String>,
@@ -50,7 +50,7 @@ pub(super) struct Rows {
     empty: Vec<(u64, usize)>,
 }
 
-/// Properties of the first row, which all other rows must have.
+/// Line of the first row, and its numbers of fields, which all other rows must have.
 #[derive(Debug, Clone, Copy)]
 struct FirstRow {
     line: u64,

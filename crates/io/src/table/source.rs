@@ -28,7 +28,7 @@ const HEAD: u64 = 512;
 const VERSION: std::ops::Range<usize> = 124..128;
 const VERSION_73: [u8; 4] = *b"\x00\x02IM";
 
-/// Counter of the stored bytes of a file that were read.
+/// Counter of the bytes read from a file; for gzip, the packed bytes are counted.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Stored(Arc<AtomicUsize>);
 
@@ -52,7 +52,8 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-/// Unpacked text whose length is limited by the number of bytes read of its file.
+/// Text unpacked from gzip. Its length is limited; the limit depends on the number of bytes read
+/// from the packed file.
 struct Bounded<'a> {
     text: Box<dyn BufRead + Send + 'a>,
     /// Number of unpacked bytes read so far.
@@ -98,7 +99,7 @@ pub(crate) struct Source<'a> {
     pub gzip: bool,
     /// `true` for UTF-16, which is converted to UTF-8.
     pub utf16: bool,
-    /// Counter of the stored bytes of the file.
+    /// Counter of the bytes read from the file; for gzip, the packed bytes are counted.
     pub stored: Stored,
     /// First bytes, which `reader` also returns.
     head: Vec<u8>,

@@ -108,7 +108,7 @@ impl<'a> TextReader<'a> {
         let Self { layout, table, blocks, rows } = self;
         let (layout, plan) = (*layout, rows.plan());
         let shared = Mutex::new(Shared { blocks, next: 0 });
-        // For each thread, one block is being read and one more waits to be appended.
+        // Two blocks per thread exist at a time: one is being read, and one waits to be appended.
         let (free, freed) = channel();
         let freed = Mutex::new(freed);
         let under_way = 2 * threads;

@@ -177,7 +177,7 @@ pub(super) fn at_rate(file: &str, rate_hz: f64, len: usize) -> Result<Sampling, 
         .map_err(|source| IoError::Signal { file: file.into(), source })
 }
 
-/// Returns the mean step, in s, of equally spaced instants in `unit` s.
+/// Returns the mean step, in s, of equally spaced instants given in units of `unit` s.
 fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError> {
     let mut steps = Steps::default();
     for (k, time) in times.iter().enumerate() {
@@ -224,8 +224,8 @@ impl Steps {
         self.instants += 1;
     }
 
-    /// Returns the mean step, in s, of instants in `unit` s, or an error if they are not equally
-    /// spaced.
+    /// Returns the mean step, in s, of instants given in units of `unit` s, or an error if the
+    /// instants are not equally spaced.
     pub fn step(mut self, file: &str, unit: f64) -> Result<f64, IoError> {
         let (Some(shortest), Some(longest)) = (self.shortest, self.longest) else {
             return Err(IoError::SingleSample { file: file.into() });

@@ -82,7 +82,8 @@ pub(super) fn is_called_time(name: &str) -> bool {
     is_time || NAMES.contains(&bare.as_str()) || NAMES.contains(&last.trim())
 }
 
-/// Returns the text of a unit of another quantity that a time column states.
+/// Returns the text that a time column states as its unit, if this text cannot be read as a unit of
+/// time.
 pub(super) fn unclear(column: &Column) -> Option<String> {
     let stated = stated(&column.name, &column.unit, Some(Quantity::Time))?;
     let unclear = stated.evidence == Evidence::Unused && !is_clock(&stated.text);
@@ -100,7 +101,7 @@ pub(super) fn doubtful(column: &Column) -> Option<StatedUnit> {
     match stated.used() {
         Some(unit) if is_time(unit) => {
             let is_clear = stated.evidence == Evidence::Stated;
-            // The unit of a column called `s` has the factor 1.
+            // A column called `s` is not doubtful: a time without a unit is read in seconds, too.
             let is_second = unit.in_si == 1.0 && stated.text == unit.name;
             (!is_clear && !is_second).then_some(stated)
         }

@@ -34,7 +34,8 @@ pub(super) fn dataset(
     if header.count == 0 {
         return Err(Fault::new(header.form_at, "a function without values"));
     }
-    // A number needs at least one byte, so a forged header cannot claim more memory than that.
+    // A number needs at least one byte, so the number of remaining bytes limits the memory that a
+    // forged header can claim.
     let numbers = header.numbers().min(lines.rest().len());
     let room = (0..if header.is_even { 1 } else { 2 }).try_for_each(|_| budget.take_column());
     room.and_then(|()| budget.take_numbers(numbers))

@@ -206,7 +206,8 @@ fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<S
     Ok(format!("{node}{sign}{axis}"))
 }
 
-/// Returns the quantity of the ordinate: its label or, without one, its type, and its unit.
+/// Returns the quantity of the ordinate with its unit, such as `velocity in mm/s`. The quantity is
+/// the label of the ordinate or, without a label, the name of its data type.
 fn quantity(line: &Line<'_>) -> Result<String, Fault> {
     let kind: u32 = whole(line, 0, 10)?;
     let (name, unit) = (label(field(line, 26, 20)), label(field(line, 47, 20)));

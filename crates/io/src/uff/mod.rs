@@ -119,7 +119,8 @@ fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
 }
 
 impl Units {
-    /// Sets the unit of columns with a known quantity whose label is not a unit.
+    /// Applies the unit of dataset 164 to each column of a known quantity, unless the label of the
+    /// column states a unit other than the SI unit.
     fn apply(&self, columns: &mut [Column]) {
         for column in columns {
             let Some(quantity) = column.kind else { continue };

@@ -146,7 +146,7 @@ fn add(
 }
 
 /// Returns the size of the unit of the frequencies, in Hz, that the label of the abscissa states; a
-/// label that is not a unit of a frequency is added to the doubts.
+/// label that does not clearly state a unit of a frequency is added to `doubts`.
 fn frequency_unit(responses: &mut FrequencyResponses, header: &Header) -> f64 {
     let Some(stated) = header.abscissa_unit(Quantity::Frequency) else { return 1.0 };
     let is_frequency = |unit: &&Unit| unit.quantity == Quantity::Frequency;

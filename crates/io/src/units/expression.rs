@@ -169,7 +169,7 @@ impl Parser<'_> {
         if len == 0 {
             return (!marked).then_some(None);
         }
-        // The 1 of `g1` is the number of a point.
+        // The 1 of `g1` is the number of a measurement point, not an exponent.
         if !marked && !minus && &unsigned[..len] == "1" {
             return None;
         }
@@ -219,8 +219,8 @@ mod tests {
         Some(([l, t, f], in_si))
     }
 
-    /// Products and quotients have the dimension and the size that follow by hand from the
-    /// definitions of the units.
+    /// Products and quotients of units have the dimension and the size that a calculation by hand
+    /// gives from the definitions of the units.
     #[test]
     fn products_and_quotients_have_their_dimension_and_size() {
         let acceleration = [1, -2, 0];

@@ -84,8 +84,8 @@ pub(crate) fn stated(name: &str, unit: &str, wanted: Option<Quantity>) -> Option
 const SAME_SIZE: f64 = 1e-9;
 
 /// Returns the texts in a header that clearly state a unit: in brackets, in the name outside of
-/// brackets, and in a separate text. The unit is `None` for the output of an amplifier in the
-/// separate text.
+/// brackets, and in a separate text. An electric unit (voltage, charge, counts) in the separate
+/// text is the output of an amplifier; its text is returned with the unit `None`.
 fn other_units(
     notes: &[&str],
     outside: &str,
@@ -102,8 +102,8 @@ fn other_units(
     let words = unit_from_words(outside, wanted).filter(is_clear);
     let words = unit_after_slash(outside).filter(is_clear).or(words);
     let texts: Vec<&str> = notes_of(text).collect();
-    // If a text has a sensitivity beside the unit of an amplifier, the sensitivity states the unit
-    // of the numbers.
+    // If the separate text has both a sensitivity and the unit of the output of an amplifier, the
+    // sensitivity states the unit of the numbers.
     let is_sensitivity = |note: &&str| number_and_rest(note).is_some();
     let is_electric =
         |note: &str| Expression::parse(note).is_some_and(|unit| unit.dimension.is_electric());
@@ -146,7 +146,8 @@ fn first_stated(
     if in_brackets.as_ref().is_some_and(is_used) {
         return in_brackets;
     }
-    // The slash of `velmm/s` belongs to the unit; a unit of time alone cannot follow a slash.
+    // The slash of `velmm/s` is part of the unit mm/s, so the `s` after the slash is not the unit
+    // of the column.
     let is_of_unit = |statement: &StatedUnit| {
         let is_time = statement.unit.as_ref().is_some_and(|unit| unit.quantity == Quantity::Time);
         is_time && wanted.is_some_and(|wanted| wanted != Quantity::Time)
@@ -255,7 +256,7 @@ fn split_at_slash(name: &str) -> Option<(&str, Expression)> {
     if last_word.is_some_and(|unit| unit.dimension.is_electric()) {
         return None;
     }
-    // `v/mm/s` is not a voltage divided by a velocity.
+    // In `v/mm/s`, `v` is the name and mm/s the unit; it is not a voltage divided by a velocity.
     let is_unit_alone = Expression::parse(name).is_some_and(|unit| !unit.dimension.is_electric());
     let is_name = !is_unit_alone && !before.trim().is_empty();
     let is_unit = Quantity::from_dimension(unit.dimension).is_some();

@@ -158,7 +158,7 @@ pub(crate) struct ResponseUnit {
     pub quantity: ResponseQuantity,
     /// `true` for a force over a response: dynamic stiffness, mechanical impedance, apparent mass.
     pub is_inverse: bool,
-    /// Size in the SI unit of the ratio.
+    /// Size of the unit, in the SI unit of the same ratio.
     pub in_si: f64,
 }
 

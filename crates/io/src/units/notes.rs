@@ -200,7 +200,7 @@ fn without_unit_word(note: &str) -> &str {
 pub(super) fn read_note(note: &str, wanted: Option<Quantity>) -> Note {
     let note = bare_note(note);
     if let Some(unit) = Unit::parse(note) {
-        // The unit 1/s is also used for angular velocities.
+        // The unit 1/s is not clearly a frequency, because angular velocities use it, too.
         let is_bare = unit.quantity == Quantity::Frequency
             && note.chars().all(|c| c.is_numeric() || "/s^-⁻".contains(c));
         return if is_bare { Note::Qualified(unit) } else { Note::Unit(unit) };

@@ -14,7 +14,7 @@ const MAX_WORDS: usize = 4;
 /// be two initials.
 const MAX_CASED: usize = 2;
 
-/// Spellings of units that are other words in the name of a column: `force_std`, `acc second`.
+/// Spellings of units that have another meaning in the name of a column: `force_std`, `acc second`.
 const OTHER_WORDS: [&str; 27] = [
     "std",
     "ss",
@@ -136,7 +136,7 @@ pub(super) fn is_preposition(word: &str) -> bool {
 
 /// Reads words as a unit of any quantity.
 fn read(parts: &[&str]) -> Option<(Dimension, Option<Unit>)> {
-    // The first word of `hits in s` is a preposition.
+    // The word `in` of `hits in s` is a preposition, not an inch.
     let is_after_in = parts.len() > 1 && is_preposition(parts[0]);
     if let Some(unit) = joined_unit(parts).filter(|_| !is_after_in) {
         let dimension = Expression::parse(&unit.name).map(|unit| unit.dimension)?;
@@ -155,8 +155,8 @@ fn product(parts: &[&str], wanted: Quantity) -> Option<(Dimension, Option<Unit>)
     (wanted == Quantity::Force && parts.len() == 2).then_some((moment, None))
 }
 
-/// Returns whether the digit at the end of a word is the number of a point rather than an exponent:
-/// `m2`.
+/// Returns whether the digit at the end of a word is the number of a measurement point rather than
+/// an exponent: `m2`.
 pub(super) fn is_numbered(word: &str) -> bool {
     word.ends_with(|c: char| c.is_ascii_digit()) && !is_compound(word) && !is_spelling(word)
 }

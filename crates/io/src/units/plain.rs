@@ -74,8 +74,8 @@ fn exponent(text: &str) -> Option<(i32, &str)> {
     Some((text[..end].parse().ok().filter(|_| len > 0)?, &text[end..]))
 }
 
-/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`, `/1000`; `x10` may be the number of
-/// a point.
+/// Returns the factor beside a name: `*1000`, `x 1000`, `×10`, `/1000`. The result is `None` for
+/// `x10`, which may be the number of a measurement point.
 pub(super) fn multiplier(name: &str) -> Option<&str> {
     let starts = name.char_indices().filter(|(_, c)| "*×xX/÷".contains(*c));
     starts.into_iter().find_map(|(at, sign)| {
@@ -84,7 +84,8 @@ pub(super) fn multiplier(name: &str) -> Option<&str> {
         let (number, rest) = number_and_rest(after.trim_start())?;
         let is_power_of_ten = number.log10().fract() == 0.0;
         let is_factor = match sign {
-            // A number after `x` is a factor only if it cannot be the number of a point.
+            // A number after `x` is a factor only if it is at least 100: `x10` may be the number of
+            // a measurement point.
             'x' | 'X' => {
                 let is_word = !before.is_some_and(char::is_alphanumeric);
                 is_word && number >= 100.0 && is_power_of_ten
@@ -102,8 +103,8 @@ pub(super) fn multiplier(name: &str) -> Option<&str> {
 }
 
 /// Returns whether a text beside a unit begins with a factor: `1/1000`, `%`, `x1000`, `0.1`. After
-/// a unit, a number is a factor only if it is a power of ten and at least 10; other numbers count
-/// channels.
+/// a unit, a number is a factor only if it is a power of ten and at least 10; another number is the
+/// number of a channel.
 pub(super) fn may_be_factor(text: &str, is_after_unit: bool) -> bool {
     let number = |word: &str| match number_and_rest(word) {
         Some((number, "")) => Some(number),

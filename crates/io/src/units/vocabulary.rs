@@ -79,8 +79,8 @@ const TURN: f64 = std::f64::consts::TAU;
 
 use Dimension as D;
 
-/// Spellings that are units only with exactly these capital and small letters: `F_DN` may point
-/// down, and `F_CN` be a channel.
+/// Spellings that are units only with exactly these capital and small letters: the `DN` of `F_DN`
+/// may mean down, and the `CN` of `F_CN` may be the name of a channel.
 pub(super) const CASED: [&str; 4] = ["nN", "cN", "dN", "hN"];
 
 /// All units. Spellings differ in case only where the units do (`mN` and `MN`).

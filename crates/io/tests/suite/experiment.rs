@@ -162,7 +162,8 @@ fn listed(size: usize, entries: &[(usize, usize, f64)]) -> serde_json::Value {
 fn sparse_matrices_stand_in_the_description() {
     let described = |size: usize| {
         let one: Vec<_> = (1..=size).map(|i| (i, i, 1.0)).collect();
-        // One entry of the stiffness is given in two parts, and one only below the diagonal.
+        // The diagonal entry (1, 1) of the stiffness is listed twice, and its two values add up.
+        // The entry (2, 1) is listed, but the entry (1, 2) is not, so that the latter is zero.
         let more = [(1, 1, 2.0), (2, 1, -0.5)];
         let k: Vec<_> = one.iter().copied().chain(more).collect();
         let system = serde_json::json!({

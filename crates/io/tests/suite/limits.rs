@@ -128,7 +128,7 @@ fn numbers_held_have_a_limit() {
 }
 
 /// The memory limit follows from the size of the file: a small file that claims much memory is
-/// refused, for any limits on numbers and unpacked bytes.
+/// refused, even if the limits on numbers and on unpacked bytes allow its contents.
 #[test]
 fn memory_has_a_limit_by_the_size_of_the_file() {
     let memory = |bytes: &[u8]| match Table::parse("a", bytes) {
@@ -172,7 +172,8 @@ fn more_lines_are_skipped_than_there_are() {
     assert_eq!(e.to_string(), "a holds no data: all lines of the file are skipped");
 }
 
-/// Messages show any contents of a file on one line, unchanged except for escapes.
+/// Messages repeat the text of a file on one line, with control characters as escapes and all other
+/// characters unchanged.
 #[test]
 fn messages_hold_nothing_that_a_terminal_obeys() {
     let name = "x\u{1b}[31m\u{202e}\u{7}";

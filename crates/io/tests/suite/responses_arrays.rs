@@ -69,7 +69,7 @@ fn vectors_are_known_by_the_points_in_their_names() {
     assert_eq!(responses.functions[1].values[4], value(4, 1, 0));
 }
 
-/// Name, lengths, real and imaginary parts.
+/// Variable of a MATLAB file: name, lengths of the dimensions, real parts, imaginary parts.
 type Variable<'a> = (&'a str, &'a [u32], &'a [f64], &'a [f64]);
 
 /// Returns a MATLAB file whose variables are these vectors; a vector is complex if it has imaginary

@@ -211,7 +211,8 @@ fn a_text_that_is_not_understood_or_may_be_a_unit_is_reported() {
     }
 }
 
-/// Reference: with 11.2 mV per newton, 1 mV is 1/11.2 N.
+/// A sensitivity in the header gives the factor of an electric unit. Reference: with 11.2 mV per
+/// newton, 1 mV is 1/11.2 N.
 #[test]
 fn a_sensitivity_beside_the_unit_gives_the_factor() {
     for (name, quantity, factor) in [
@@ -280,8 +281,8 @@ fn a_name_is_what_stands_beside_the_unit() {
     ] {
         assert_eq!(table(name).short_name(0), bare, "{name}");
     }
-    // The column is found in upper or lower case, with or without the unit, and with or without the
-    // other brackets.
+    // The column is found in upper or lower case, with or without the unit `[N]`, and with or
+    // without `(left)`.
     let columns = table("Force [N] (left)");
     for wanted in ["Force [N] (left)", "Force (left)", "Force", "force"] {
         assert_eq!(columns.find(wanted).unwrap(), 0, "{wanted}");
@@ -521,7 +522,7 @@ fn units_that_contradict_each_other_are_reported() {
 enum Answer {
     /// The numbers are multiplied by the factor, without a finding.
     Factor(f64),
-    /// A finding names this text; the numbers are read in SI units.
+    /// A finding names the text of the unit; the numbers are read as if they were in SI units.
     Finding,
     /// No unit and no finding.
     Nothing,

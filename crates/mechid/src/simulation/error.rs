@@ -34,8 +34,8 @@ pub enum SimulateError {
     ExactFromRest,
     /// The exact scheme is only for linear machines.
     #[error(
-        "the scheme \"exact\" is for linear machines: choose another one for nonlinear terms, such as \
-         newmark or runge-kutta-4, and steps that are much shorter than the period of the fastest motion"
+        "the scheme \"exact\" is for linear machines: for nonlinear terms, choose another scheme, such as \
+         newmark or runge-kutta-4, with steps that are much shorter than the period of the fastest motion"
     )]
     ExactNonlinear,
     /// A periodic response has no initial conditions.
@@ -85,7 +85,7 @@ pub enum SimulateError {
     UnstableOverflow {
         /// The growing free response.
         instability: Instability,
-        /// Error of the time steps, with the position of the overflow.
+        /// Error that the time-stepping scheme returned; it states where the response overflows.
         #[source]
         error: IntegrateError,
     },

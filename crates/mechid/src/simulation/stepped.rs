@@ -28,9 +28,9 @@ pub struct Multiplier {
     pub scheme_error: Option<f64>,
 }
 
-/// Maximum excess over 1 of the modulus of a Floquet multiplier that counts as rounding of a double
-/// multiplier, as for an undamped machine: about the square root of the accuracy of the multipliers
-/// (pure number).
+/// Maximum excess over 1 of the modulus of a Floquet multiplier that counts as rounding (pure
+/// number). Rounding changes a double multiplier, such as that of an undamped machine, by about the
+/// square root of the accuracy of a single multiplier.
 const MULTIPLIER_ROUNDING: f64 = 1e-4;
 
 /// Response, and for a periodic response of a nonlinear machine its largest multiplier.

@@ -82,7 +82,7 @@ pub struct SimulatedChannel {
 /// The fastest growing free response.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeGrowth {
-    /// Real and imaginary part, in rad/s.
+    /// Real and imaginary part of the pole, in rad/s.
     pub pole: [f64; 2],
     /// Growth rate, in 1/s.
     pub growth_rate: f64,

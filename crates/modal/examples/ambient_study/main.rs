@@ -413,7 +413,8 @@ const ROWS: usize = 1 + BLOCK_ROWS.len();
 /// Largest half order of a subspace model.
 const MAX_HALF_ORDER: usize = 24;
 
-/// Squared relative errors of f and ζ by mode, setting and half order, with their number.
+/// Sums of the squared relative errors of f and of ζ, and number of estimates, for each mode, each
+/// setting and each half order (half of the model order).
 struct SubspaceErrors {
     sums: Vec<[[[f64; 3]; MAX_HALF_ORDER]; ROWS]>,
     records: usize,

@@ -189,7 +189,8 @@ impl Case {
 }
 
 impl Setting {
-    /// Returns the clusters of poles of all orders.
+    /// Returns the pole of each cluster over all model orders, without the damping that the window
+    /// adds.
     fn poles(&self, case: &Case, forces: &Record, motion: &Record) -> Vec<C> {
         let (starts, len, decay) = match *self {
             Self::Hann(len) => (

@@ -21,7 +21,7 @@ use crate::generator::Case;
 
 type C = Complex<f64>;
 
-/// Standard deviations at the bound, of f (Hz) and ζ of each mode in the band.
+/// Cramér–Rao bound: smallest standard deviations of f (Hz) and ζ of each mode in the band.
 pub struct Bound {
     pub frequency: Vec<f64>,
     pub damping: Vec<f64>,
@@ -49,7 +49,7 @@ impl Bound {
     }
 }
 
-/// Returns the information on f and ζ of all modes, one after the other.
+/// Returns the Fisher information of f and ζ of all modes, mode by mode.
 fn information(case: &Case, seed: u64) -> DMatrix<f64> {
     if !case.roving {
         return of_record(case, seed);
@@ -58,7 +58,7 @@ fn information(case: &Case, seed: u64) -> DMatrix<f64> {
     (0..points).map(|point| of_record(&case.at_point(point), case.seed_at(seed, point))).sum()
 }
 
-/// Returns the information of one record.
+/// Returns the Fisher information of f and ζ of all modes in one record.
 fn of_record(case: &Case, seed: u64) -> DMatrix<f64> {
     let clean = Case { noise: 0.0, unmeasured: 0.0, force_noise: 0.0, ..case.clone() };
     let lines = |case: &Case| -> DMatrix<C> { case.lines(seed).outputs().clone() };
@@ -104,8 +104,8 @@ fn of_mode(
     alone.lines(seed).outputs().clone()
 }
 
-/// Returns the derivatives with respect to the unknowns that all outputs share, except the poles:
-/// participations of all forces but the first, and initial states.
+/// Returns the derivatives with respect to the participations of all forces but the first, and to
+/// the initial states. All outputs share these unknowns and the poles.
 fn shared_derivatives(case: &Case, seed: u64) -> Vec<DMatrix<C>> {
     let inputs = case.participation[0].len();
     let mut all = Vec::new();
@@ -222,7 +222,7 @@ fn schur(all: &DMatrix<f64>, kept: usize) -> DMatrix<f64> {
     DMatrix::from_fn(kept, kept, |a, b| left[(a, b)] / (scale[a] * scale[b]))
 }
 
-/// Returns the information for independent outputs.
+/// Returns the Fisher information of f and ζ for outputs whose noise is independent.
 fn by_output(
     shared: &[DMatrix<C>],
     own: &[DMatrix<C>],
@@ -243,7 +243,7 @@ fn by_output(
     schur(&sum, kept)
 }
 
-/// Returns the information for outputs whose noise is correlated.
+/// Returns the Fisher information of f and ζ for outputs whose noise is correlated.
 fn by_line(
     shared: &[DMatrix<C>],
     own: &[DMatrix<C>],

@@ -13,8 +13,8 @@ use super::transient::TransientResponse;
 use crate::decomposition::hermitian_eigen;
 
 /// Step of the second differences of the spectrum, in standard errors of a combination of
-/// parameters. The step is shorter if it would change a parameter by more than this number; the
-/// parameters have unit scale.
+/// parameters. Parameters have unit scale. If the step would change a parameter by more than 0.05,
+/// a shorter step is used.
 const ERROR_STEP: f64 = 0.05;
 
 /// Parts of the mean excess of the fitted spectrum over the true spectrum, M = ½ Σ C_ab
@@ -26,10 +26,10 @@ const ERROR_STEP: f64 = 0.05;
 pub(super) struct Excess {
     centre: Coefficients,
     /// Coefficients after a step to either side of the fit, along each column of F that changes
-    /// poles, each with the weight of its spectrum in M.
+    /// poles. The number beside the coefficients is the weight of their spectrum in M.
     moved: Vec<(Coefficients, f64)>,
-    /// Contribution of the columns of F that do not change poles: half the sum of the second
-    /// derivatives of ψγᵀ of each mode, and of D Q Dᵀ.
+    /// Contribution to M of the columns of F that do not change poles. An entry of `residues` is
+    /// half the sum of the second derivatives of ψγᵀ of one mode; `direct_power` is that of D Q Dᵀ.
     residues: Vec<DMatrix<Complex<f64>>>,
     direct_power: DMatrix<f64>,
     /// Covariance of the noise parameters of each output.
@@ -86,7 +86,7 @@ impl Fit {
             direct_power: DMatrix::zeros(p, p),
             noise: noise.collect(),
         };
-        // Columns of the noise change neither poles nor residues.
+        // The columns of F for the noise parameters change neither poles nor residues.
         for (index, error) in factor.column_iter().enumerate().take(layout.noise(0, 0)) {
             let step = ERROR_STEP / error.amax().max(1.0);
             let weight = 0.5 / (step * step);
@@ -122,8 +122,8 @@ impl Fit {
 }
 
 impl Excess {
-    /// Adds `weight` times the differences of ψγᵀ and D Q Dᵀ between `moved` and the centre. Both
-    /// have the same poles.
+    /// Adds `weight` times the differences of ψγᵀ and D Q Dᵀ between `moved` and the centre;
+    /// `moved` and the centre have the same poles.
     fn add_residues(&mut self, moved: &Coefficients, weight: f64) {
         for (r, sum) in self.residues.iter_mut().enumerate() {
             for (coefficients, sign) in [(moved, weight), (&self.centre, -weight)] {

@@ -32,7 +32,8 @@ pub enum AmbientError {
         channel: usize,
         /// RMS value in the band, in the unit of the channel.
         rms: f64,
-        /// Ratio of the RMS value to the RMS value of the strongest channel.
+        /// Ratio of the RMS value of this channel to the RMS value of the strongest channel, both
+        /// in the band.
         ratio: f64,
     },
     /// A channel is a multiple of another channel.
@@ -82,9 +83,9 @@ pub enum AmbientError {
         "`band_hz` is {from_hz} to {to_hz} Hz, but its lower end must be at least 0 and below its upper end, which must be at most {nyquist_hz} Hz, half the sampling rate"
     )]
     Band {
-        /// Lower end given, in Hz.
+        /// Requested lower end of the band, in Hz.
         from_hz: f64,
-        /// Upper end given, in Hz.
+        /// Requested upper end of the band, in Hz.
         to_hz: f64,
         /// Half the sampling rate, in Hz.
         nyquist_hz: f64,
@@ -123,7 +124,7 @@ pub enum AmbientError {
     /// A decomposition or a search failed.
     #[error("{what} ({size} unknowns) failed: two channels of the record may be copies")]
     Numerics {
-        /// Name of the step.
+        /// Name of the decomposition or search that failed.
         what: &'static str,
         /// Number of unknowns.
         size: usize,

@@ -1,5 +1,5 @@
-//! Sinusoids of machines in an ambient record: Thomson's F-test with sine tapers, and their
-//! removal.
+//! Sinusoids of machines in an ambient record: detection by Thomson's F-test with sine tapers, and
+//! subtraction from the record.
 
 use std::f64::consts::{PI, TAU};
 

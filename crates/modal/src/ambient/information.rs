@@ -54,13 +54,13 @@ fn chain_correlations(parameters: &Parameters, information: &mut DMatrix<f64>) {
     let pairs = &parameters.layout.pairs;
     let jacobian = DMatrix::from_fn(pairs.len(), pairs.len(), |pair, entry| {
         let ((r, s), (row, column)) = (pairs[pair], pairs[entry]);
-        let other = match row {
+        let partner = match row {
             _ if row == r => s,
             _ if row == s => r,
             _ => return 0.0,
         };
-        let along = factor.row(row).dot(&factor.row(other));
-        (factor[(other, column)] - along * factor[(row, column)]) / raw.row(row).norm()
+        let along = factor.row(row).dot(&factor.row(partner));
+        (factor[(partner, column)] - along * factor[(row, column)]) / raw.row(row).norm()
     });
     let first = parameters.layout.correlation(0);
     let columns = information.columns(first, pairs.len()) * &jacobian;
@@ -193,17 +193,17 @@ impl<'a> LineInformation<'a> {
     fn add_direction_and_shapes(&self, at: usize, sum: &mut DMatrix<f64>) {
         let p = self.basis.nrows();
         let direction = &self.directions.all[at];
-        let left = 2 * direction.left;
+        let first_left = 2 * direction.left;
         let mut column = sum.column_mut(direction.index);
         let column = column.as_mut_slice();
         let [re, im] = &self.directions.columns;
-        let [left_re, left_im] = parts(&self.basis.columns(left, 2).into_owned());
+        let [left_re, left_im] = parts(&self.basis.columns(first_left, 2).into_owned());
         let weight = 2.0 * self.line.count;
         for shape in 0..self.cross.nrows() {
             let first = self.shape_index(shape, 0);
             let entries = &mut column[first..first + p];
             for k in 0..2 {
-                let of_left = self.cross[(shape, left + k)] * weight;
+                let of_left = self.cross[(shape, first_left + k)] * weight;
                 let of_right = self.directions.with_shapes[(2 * at + k, shape)].conj() * weight;
                 // Rows of W P and of V_lᵀ P are conjugates of columns of P Wᴴ and of P V_l.
                 let right = columns_of(re, im, 2 * at + k);
@@ -220,8 +220,9 @@ impl<'a> LineInformation<'a> {
         self.layout.shape(column / 2) + (column % 2) * self.layout.outputs + output
     }
 
-    /// Adds the information between parameter `index` and the noise parameters; `value` returns the
-    /// information with the noise variance of an output. A pair of noise parameters is added once.
+    /// Adds the information between parameter `index` and the noise parameters; `value(j)` is the
+    /// information between this parameter and the noise variance of output j. A pair of two noise
+    /// parameters is added only once.
     fn add_noise(&self, index: usize, sum: &mut DMatrix<f64>, value: impl Fn(usize) -> f64) {
         for (j, variance) in self.variances.iter().enumerate() {
             let value = value(j) * variance;
@@ -296,10 +297,10 @@ impl Directions {
 
     /// Returns entry (i, i) of P S_b P for direction `at`.
     fn diagonal(&self, at: usize, i: usize, basis: &DMatrix<Complex<f64>>) -> f64 {
-        let left = 2 * self.all[at].left;
+        let first_left = 2 * self.all[at].left;
         let [re, im] = &self.columns;
         let terms = (0..2).map(|k| {
-            let z = basis[(i, left + k)];
+            let z = basis[(i, first_left + k)];
             z.re * re[(i, 2 * at + k)] + z.im * im[(i, 2 * at + k)]
         });
         2.0 * terms.sum::<f64>()

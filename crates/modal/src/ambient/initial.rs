@@ -23,7 +23,8 @@ const AMPLITUDE_STEPS: usize = 3;
 /// Half width, in decay rates, of the lines that determine an amplitude.
 const AMPLITUDE_HALF_WIDTH: f64 = 2.0;
 
-/// Possible quantities of the outputs. Each has a kernel and the phase of ψ for a real mode.
+/// Possible quantities of the outputs: for each one its kernel, and the phase of ψ, in rad, for a
+/// real mode shape.
 const QUANTITIES: [(Kernel, f64); 5] = [
     (Kernel::Static, -FRAC_PI_2),
     (Kernel::Static, 0.0),
@@ -132,8 +133,9 @@ const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 /// Half width, in decay rates, of the lines that one grid point of the scan uses.
 const SCAN_HALF_WIDTH: f64 = 8.0;
 
-/// Returns candidates of further modes by falling gain: at each pole of a grid the largest
-/// eigenvalue of Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
+/// Returns a candidate for a further mode at each pole of a grid, in falling order of gain. The
+/// gain follows from the largest eigenvalue of Σ |h|² (e eᴴ − I), with the whitened lines e and the
+/// resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
     let coefficients = Coefficients::new(parameters);
     let outputs = band.outputs();

@@ -30,18 +30,18 @@ pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
     (0..parameters.layout.outputs).map(|i| parameters.log_noise(i, terms).exp()).collect()
 }
 
-/// Counts the operations of one pass over the lines with this number of products of matrices of all
-/// channels for each line.
-pub(super) fn spend(parameters: &Parameters, lines: &[PooledLines], products: usize) {
+/// Counts the operations of one pass over a number of lines, with this number of products of
+/// matrices of all channels for each line.
+pub(super) fn spend(parameters: &Parameters, lines: usize, products: usize) {
     let (channels, modes) = (parameters.layout.outputs as f64, parameters.layout.modes as f64);
     let of_products = channels * channels * (channels * products as f64 + modes);
     let of_line = LINE_OPERATIONS + MODE_OPERATIONS * modes + PRODUCT_OPERATIONS * of_products;
-    time_limit::spend(lines.len() as f64 * of_line);
+    time_limit::spend(lines as f64 * of_line);
 }
 
 /// Counts the operations of the Fisher information of these lines.
 pub(super) fn spend_on_information(parameters: &Parameters, lines: &[PooledLines]) {
-    spend(parameters, lines, 3);
+    spend(parameters, lines.len(), 3);
     let entries = parameters.layout.len() as f64;
     time_limit::spend(lines.len() as f64 * ENTRY_OPERATIONS * entries * entries);
 }
@@ -52,7 +52,7 @@ pub(super) fn spend_on_information(parameters: &Parameters, lines: &[PooledLines
 /// # Source
 /// Whittle (1953), Arkiv för Matematik 2, 423–434.
 pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
-    spend(parameters, lines, 1);
+    spend(parameters, lines.len(), 1);
     let coefficients = Coefficients::new(parameters);
     let one = |line: &PooledLines| {
         let kernels = coefficients.kernels(line.omega, span);
@@ -74,9 +74,10 @@ pub(super) fn log_determinant(factor: &Cholesky<Complex<f64>, Dyn>) -> f64 {
 /// k̃ with their derivatives k′ and k̃′.
 #[derive(Clone)]
 struct GradientSums {
-    /// Σ k Γ + conj Σ k̃ Γ of each mode.
+    /// Sum Σ k Γ + conj Σ k̃ Γ of each mode, for the derivatives with respect to its shape.
     shapes: Vec<DMatrix<Complex<f64>>>,
-    /// Σ k′ tr ΓΨ + conj Σ k̃′ tr ΓΨ* of each mode.
+    /// Sum Σ k′ tr ΓΨ + conj Σ k̃′ tr ΓΨ* of each mode, for the derivatives with respect to its
+    /// pole.
     poles: Vec<Complex<f64>>,
     /// Re Σ Γ.
     direct: DMatrix<f64>,
@@ -146,7 +147,7 @@ pub(super) fn gradient(
     lines: &[PooledLines],
     span: Span,
 ) -> Option<DVector<f64>> {
-    spend(parameters, lines, 3);
+    spend(parameters, lines.len(), 3);
     let coefficients = Coefficients::new(parameters);
     let chunk = |chunk: &[PooledLines]| {
         let mut sums = GradientSums::zero(parameters);

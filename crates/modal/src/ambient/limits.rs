@@ -67,8 +67,8 @@ pub(super) const MAX_POOLING_CHANGE: f64 = 0.01;
 /// as a share of the distance to the nearest pole.
 pub(super) const COARSE_POOLING: f64 = 0.3;
 
-/// Number of Chebyshev polynomials of the logarithm of a sensor's noise over the band, while modes
-/// are chosen.
+/// Number of Chebyshev polynomials that describe the logarithm of the noise variance of a sensor
+/// over the band while the modes are chosen.
 pub(super) const NOISE_TERMS: usize = 3;
 
 /// Number of polynomials of the noise that are tried at a time: an even and an odd one.
@@ -92,11 +92,12 @@ pub(super) const DETERMINED_SHARE: f64 = 1e-8;
 /// subtracted, because the first-order formula is then unreliable.
 pub(super) const MAX_BIAS: f64 = 1.0;
 
-/// Maximum number of alternations between the parameters and the transient.
+/// Maximum number of alternations between a fit of the parameters and a prediction of the
+/// transient.
 pub(super) const TRANSIENT_ROUNDS: usize = 6;
 
-/// Number of candidates that are refused, or accepted without an additional mode, at which the
-/// search for further modes ends.
+/// Maximum number of candidates without success: the search for further modes ends when this number
+/// of candidates were refused, or added a pole that is not a mode.
 pub(super) const REFUSALS: usize = 2;
 
 /// Minimum ratio of the damping of a mode to its standard error; below it the damping is

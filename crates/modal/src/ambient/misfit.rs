@@ -21,7 +21,7 @@ pub struct SpectrumMisfit {
     pub p_value: f64,
     /// Lowest and highest frequency of the group with the largest deviate, in Hz.
     pub worst_hz: [f64; 2],
-    /// Power of this group relative to the fitted spectrum.
+    /// Power of the group with the largest deviate, relative to the fitted spectrum.
     pub worst_ratio: f64,
 }
 
@@ -47,7 +47,8 @@ struct Group {
 }
 
 impl Group {
-    /// Returns a normal deviate: the power has the gamma distribution with the shape `count`.
+    /// Returns the normal deviate with the same probability as the power, which has the gamma
+    /// distribution with the shape `count`.
     ///
     /// # Source
     /// Wilson & Hilferty (1931), Proceedings of the National Academy of Sciences 17, 684–688.

@@ -121,7 +121,8 @@ pub fn identify_ambient(
         return Err(AmbientError::FewerModes { asked, found: identified, from_hz, to_hz });
     }
     let modes = fitted_modes(&fitted, &band, &accepted, &sinusoids)?;
-    // If the record is too short for intervals, its leakage is not known well enough for this test.
+    // The leakage of a record that is too short for intervals is not known well enough to test the
+    // fitted spectrum.
     let is_long = modes.iter().all(AmbientMode::has_interval);
     let misfit = if is_long { fitted.misfit() } else { None };
     let parameters = fitted.fit.parameters;

@@ -72,7 +72,8 @@ pub(super) fn choose(
 }
 
 impl Choice<'_> {
-    /// Returns the minimum increase of 2 ln L for the acceptance of a mode: ln n per parameter.
+    /// Returns the minimum increase of 2 ln L for the acceptance of a mode: ln n per parameter,
+    /// where n is twice the number of lines.
     ///
     /// # Source
     /// Schwarz (1978), Annals of Statistics 6, 461–464.
@@ -111,8 +112,8 @@ impl Choice<'_> {
     fn select_modes(&mut self, fitted: FitWithTransient) -> Chosen {
         let fit = &fitted.fit;
         let mut accepted = Vec::new();
-        for mode in 0..fit.parameters.layout.modes {
-            match self.broken_rule(fit, mode) {
+        for (mode, rule) in self.broken_rules(fit).into_iter().enumerate() {
+            match rule {
                 Some(reason) => self.drop_mode(&fit.parameters, mode, reason),
                 None => accepted.push(mode),
             }
@@ -135,8 +136,7 @@ impl Choice<'_> {
     }
 
     fn accepted_modes(&self, fit: &Fit) -> usize {
-        let modes = 0..fit.parameters.layout.modes;
-        modes.filter(|mode| self.broken_rule(fit, *mode).is_none()).count()
+        self.broken_rules(fit).iter().filter(|rule| rule.is_none()).count()
     }
 
     /// Removes insignificant modes, one after another.
@@ -172,7 +172,8 @@ impl Choice<'_> {
             let penalty = self.penalty_of_noise(next) - self.penalty_of_noise(fit);
             2.0 * (next.cost - fit.cost) + penalty
         };
-        self.weak_modes(fit)?.into_iter().find_map(|mode| {
+        let mut weak = self.weak_modes(fit)?.into_iter().take_while(|_| !time_limit::is_over());
+        weak.find_map(|mode| {
             let mut next = self.without(fit, mode)?;
             if gain(&next) >= needed {
                 // Noise that the polynomials of the noise model cannot follow looks like a mode
@@ -204,28 +205,35 @@ impl Choice<'_> {
             return None;
         }
         let needed = self.penalty();
-        self.weak_modes(&known.fit)?.into_iter().find_map(|mode| {
+        let mut weak =
+            self.weak_modes(&known.fit)?.into_iter().take_while(|_| !time_limit::is_over());
+        weak.find_map(|mode| {
             let next = search_with_transient(self.without(&known.fit, mode)?, self.band)?;
             let gain = 2.0 * (next.cost - known.cost);
             (gain < needed).then_some((next, mode, DropReason::SmallGain { gain, needed }))
         })
     }
 
-    fn broken_rule(&self, fit: &Fit, mode: usize) -> Option<DropReason> {
+    /// Returns for each pole the rule that it breaks; `None` for a mode.
+    fn broken_rules(&self, fit: &Fit) -> Vec<Option<DropReason>> {
         let (parameters, layout) = (&fit.parameters, &fit.parameters.layout);
-        let zeta = parameters.zeta(mode);
-        let omega = parameters.omega(mode);
         let (first, last) = (self.band.omega[0], self.band.omega[self.band.omega.len() - 1]);
-        if zeta > MAX_DAMPING {
-            return Some(DropReason::OverDamped { damping_ratio: zeta });
-        }
-        if omega < first || omega > last {
-            return Some(DropReason::OutsideBand);
-        }
-        let index = layout.damping(mode);
-        let variance = fit.covariance()?[(index, index)];
-        let ratio = 1.0 / variance.max(f64::MIN_POSITIVE).sqrt();
-        (ratio < DAMPING_SIGNIFICANCE).then_some(DropReason::DampingUndetermined { ratio })
+        let covariance = fit.covariance();
+        let rule = |mode: usize| {
+            let zeta = parameters.zeta(mode);
+            let omega = parameters.omega(mode);
+            if zeta > MAX_DAMPING {
+                return Some(DropReason::OverDamped { damping_ratio: zeta });
+            }
+            if omega < first || omega > last {
+                return Some(DropReason::OutsideBand);
+            }
+            let index = layout.damping(mode);
+            let variance = covariance.as_ref()?[(index, index)];
+            let ratio = 1.0 / variance.max(f64::MIN_POSITIVE).sqrt();
+            (ratio < DAMPING_SIGNIFICANCE).then_some(DropReason::DampingUndetermined { ratio })
+        };
+        (0..layout.modes).map(rule).collect()
     }
 
     fn without(&self, fit: &Fit, mode: usize) -> Option<Fit> {
@@ -249,7 +257,8 @@ impl Choice<'_> {
                 !refused.iter().any(|other| near(omega, other))
             });
             let Some(candidate) = fresh else { break };
-            // The scan only estimates the gain, for one direction at an approximate pole.
+            // The gain from the scan is only an estimate, for one direction at an approximate pole.
+            // Half of the penalty is therefore enough for a trial.
             let promising = candidate.gain > 0.5 * self.penalty();
             let is_stated = self.wanted.exactly.is_some_and(|n| self.accepted_modes(&fit) < n);
             if !promising && !is_stated {

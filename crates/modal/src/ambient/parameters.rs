@@ -7,8 +7,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 pub(super) enum Kernel {
     /// Static deflection, 1/(s − λ): for displacements and for velocities.
     Static,
-    /// Static deflection in a record without an anti-aliasing filter: frequencies above half the
-    /// sampling rate fold into the band.
+    /// Kernel with a static deflection, for a record without an anti-aliasing filter: frequencies
+    /// above half the sampling rate fold into the band.
     Sampled,
     /// No static deflection, s/(λ(s − λ)): for accelerations and for velocities.
     Vanishing,

@@ -290,7 +290,8 @@ impl Statistics<'_> {
         self.covariance[(index, index)].max(0.0).sqrt()
     }
 
-    /// Returns the bias of a parameter; 0 if the bias exceeds [`MAX_BIAS`].
+    /// Returns the bias of a parameter; 0 if the bias exceeds [`MAX_BIAS`] standard errors, because
+    /// the bias formula is then unreliable.
     fn bias(self, index: usize) -> f64 {
         let bias = self.bias[index];
         if bias.abs() <= MAX_BIAS * self.standard_error(index) { bias } else { 0.0 }

@@ -23,8 +23,8 @@ const TRIALS: usize = 12;
 /// refused; after fewer updates, only the damping of the step increases.
 const TRUSTED_UPDATES: usize = 4;
 
-/// Minimum curvature along a step that an update takes from the gradients, relative to the
-/// curvature before the update.
+/// Minimum curvature along a step after an update, relative to the curvature before the update. If
+/// the gradients give a lower curvature, the update uses this minimum.
 ///
 /// # Source
 /// Powell (1978), Lecture Notes in Mathematics 630, 144–157.
@@ -80,8 +80,8 @@ pub(super) struct Fit {
     pub parameters: Parameters,
     /// −log L.
     pub cost: f64,
-    /// Fisher information; after [`search`] it is the information of the last steps, which is
-    /// approximate.
+    /// Fisher information; after [`search`] it is approximate, because the steps update it from the
+    /// gradients.
     pub information: DMatrix<f64>,
 }
 
@@ -201,8 +201,8 @@ impl Path<'_> {
         Some(step)
     }
 
-    /// Computes the information of the steps at the parameters of the fit, if it has been updated
-    /// since the last computation.
+    /// Computes the information again, at the parameters of the fit, if steps have updated it since
+    /// the last computation.
     fn renew(&mut self, fit: &mut Fit) -> Option<()> {
         if self.updates > 0 {
             fit.information = information(&fit.parameters, self.lines.coarse, self.lines.span)?;
@@ -284,8 +284,8 @@ fn damped_step(
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-/// Returns the information scaled to a unit diagonal plus `damping`, and the scale of rows and
-/// columns.
+/// Returns the information scaled to a unit diagonal, with `damping` added to the diagonal, and the
+/// scale factors of rows and columns.
 pub(super) fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
     let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
     let floor = LEAST_INFORMATION.powi(2) * largest;

@@ -110,12 +110,12 @@ impl<'a> ShapeBasis<'a> {
         let layout = &self.parameters.layout;
         let modes = self.direct.len();
         let of_pole = |index: usize| {
-            let left = index % modes;
+            let mode = index % modes;
             let blocks = (0..modes).map(|s| {
-                let correlation = Complex::from(self.coefficients.correlation[(left, s)]);
+                let correlation = Complex::from(self.coefficients.correlation[(mode, s)]);
                 (s, self.pole_block(kernels, index, s) * correlation)
             });
-            Direction { index, left, right: blocks.collect() }
+            Direction { index, left: mode, right: blocks.collect() }
         };
         let of_pair = |(pair, (r, s)): (usize, &(usize, usize))| Direction {
             index: layout.correlation(pair),
@@ -175,7 +175,7 @@ fn first_derivative(
     let first = [step / square(pole + other), step / square(pole + other.conj())];
     let mut u = conjugate_pair(first);
     if s == r {
-        u += conjugate_pair(of_second_pole(coefficients, pole, pole, step));
+        u += conjugate_pair(changes_with_second_pole(coefficients, pole, pole, step));
     }
     u
 }
@@ -191,12 +191,12 @@ fn second_derivative(
     if s == r {
         Vector2::zeros()
     } else {
-        conjugate_pair(of_second_pole(coefficients, poles[s], poles[r], step))
+        conjugate_pair(changes_with_second_pole(coefficients, poles[s], poles[r], step))
     }
 }
 
 /// Returns the changes of g(−λ_s, λ) and g(−λ_s, λ*) for the change `step` of λ.
-fn of_second_pole(
+fn changes_with_second_pole(
     coefficients: &Coefficients,
     fixed: Complex<f64>,
     pole: Complex<f64>,

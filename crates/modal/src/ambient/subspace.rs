@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use crate::decomposition;
 use crate::stabilisation::{Pole, Stabilisation};
 
-/// Returns the poles and shapes of models of all `orders` (rising), from samples × outputs of zero
-/// mean.
+/// Returns the poles and shapes of models of all `orders` (rising) from zero-mean data, samples ×
+/// outputs.
 ///
 /// `block_rows` is the number of block rows of the Hankel matrix of the covariances; the largest
 /// lag, in samples, is nearly twice `block_rows`. `None` if there are fewer samples than lags, or a

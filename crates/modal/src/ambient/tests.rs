@@ -158,7 +158,8 @@ fn without_poles_every_line_stands_alone() {
     assert_eq!(band.pooled(&[], 0.0, 1).len(), 360);
 }
 
-/// Returns the largest ratio of Yᴴ S⁻¹ Y to its mean over groups of lines with the expected power.
+/// Returns the maximum, over all groups, of the mean of tr(S⁻¹ S_k)/outputs − 1 over the lines k of
+/// a group: S is the spectral matrix of the group, S_k that of line k.
 fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Parameters) -> f64 {
     let coefficients = Coefficients::new(parameters);
     let spectrum = |omega: f64, terms: &[f64]| {
@@ -179,9 +180,10 @@ fn largest_excess(pooled: &[PooledLines], band: &BandLines, parameters: &Paramet
     largest
 }
 
-/// One force drives three modes: the outputs move along one direction, which changes from line to
-/// line, and all other directions contain only noise. With even pooling, the spectrum of a group of
-/// lines changes little in these directions, too; with pooling by distance it does not stay even.
+/// One force drives three modes: the outputs move in one direction, which changes from line to
+/// line, and all other directions contain only noise. The power of the lines of a group is divided
+/// by the spectral matrix of the group and averaged over all directions. With even pooling, this
+/// mean exceeds 1 by less than 1 %; with pooling by the distance from the poles, by more than 20 %.
 #[test]
 fn pooled_lines_are_even_also_in_the_noise() {
     let mut parameters = parameters(Kernel::Static, 4);
@@ -219,8 +221,8 @@ fn modes_keep_their_values_when_others_come_and_go() {
     assert!((&back.values - &parameters.values).amax() < 1e-9);
 }
 
-/// The correlation of modal forces may be large even for modes that are far apart, because one
-/// force may drive both.
+/// A new order of the modes keeps the correlations of all modal forces, also of modes whose
+/// frequencies are far apart: one force may drive both modes.
 #[test]
 fn reordered_modes_keep_the_correlation_of_their_forces() {
     let layout = Layout::new(8, 2, 3);

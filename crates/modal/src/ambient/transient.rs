@@ -15,7 +15,9 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::likelihood::{TASK, log_determinant, noise, positive_factor};
+use mechid_numerics::time_limit;
+
+use super::likelihood::{TASK, log_determinant, noise, positive_factor, spend};
 use super::limits::{DETERMINED_SHARE, POOLING, TRANSIENT_ROUNDS};
 use super::lines::BandLines;
 use super::misfit::{SpectrumMisfit, misfit};
@@ -34,7 +36,8 @@ const NOISE_SHARES: [f64; 4] = [1.0, 1e-1, 1e-2, 1e-3];
 #[derive(Debug, Clone)]
 pub(super) struct Transient {
     response: TransientResponse,
-    /// Covariance of the real parts and then the imaginary parts of t, 2 modes × 2 modes.
+    /// Covariance of the real and then the imaginary parts of t, the changes of the modes over the
+    /// record, 2 modes × 2 modes.
     covariance: DMatrix<f64>,
 }
 
@@ -48,7 +51,8 @@ impl Transient {
 
 /// Prediction of the transient.
 struct Prediction {
-    /// Real parts and then imaginary parts of t, one of each per mode.
+    /// Real parts and then imaginary parts of the predicted t, the changes of the modes over the
+    /// record: one of each per mode.
     mean: DVector<f64>,
     transient: Transient,
     /// −log L of the lines, with the transient integrated out.
@@ -96,16 +100,16 @@ pub(super) fn search_with_transient(fit: Fit, band: &BandLines) -> Option<FitWit
             parameters.clone_from(&fit.parameters);
             best = Some(FitWithTransient { fit, lines, cost });
         }
-        if gain < Effort::FULL.slow {
+        if gain < Effort::FULL.slow || time_limit::is_over() {
             break;
         }
     }
     best
 }
 
-/// Returns the candidate for which the lines are most likely, with the transient that this
-/// candidate predicts. The candidates are `parameters`, and the same parameters with constant
-/// noise at or below the power of the weakest lines.
+/// Returns the candidate for which the lines are most likely. For each candidate, the transient is
+/// the one that this candidate predicts. The candidates are `parameters`, and the same parameters
+/// with constant noise at or below the power of the weakest lines.
 ///
 /// The expected periodogram does not determine noise below the leakage of the resonances. With
 /// noise that is too small, a few lines of pure noise would determine the transient.
@@ -140,6 +144,7 @@ fn weakest_power(band: &BandLines) -> Vec<f64> {
 /// Harville (1977), Journal of the American Statistical Association 72, 320–338 (best linear
 /// unbiased prediction and the likelihood without the random effects).
 fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
+    spend(parameters, band.omega.len(), 2);
     let response = TransientResponse::new(Coefficients::new(parameters), band.span)?;
     let unknowns = 2 * parameters.layout.modes;
     let indices: Vec<usize> = (0..band.omega.len()).collect();
@@ -169,11 +174,13 @@ fn predicted(parameters: &Parameters, band: &BandLines) -> Option<Prediction> {
     sound.then_some(Prediction { mean, transient, cost })
 }
 
-/// Sums over the lines for the prediction.
+/// Sums over the lines that determine the prediction of the transient.
 struct TransientSums {
-    /// 2 Re Σ Gᴴ S⁻¹ G, where the columns of G are the lines for unit changes of the modes.
+    /// 2 Re Σ Gᴴ S⁻¹ G: the columns of G are the lines for unit changes of the modes, and S is the
+    /// spectral matrix without leakage.
     information: DMatrix<f64>,
-    /// 2 Re Σ Gᴴ S⁻¹ Y, where the columns of G are the lines for unit changes of the modes.
+    /// 2 Re Σ Gᴴ S⁻¹ Y: the columns of G are the lines for unit changes of the modes, S is the
+    /// spectral matrix without leakage, and Y is a measured line of all outputs.
     score: DVector<f64>,
     /// −log L of the lines with no transient.
     cost: f64,
@@ -237,8 +244,8 @@ impl BandLines {
 #[derive(Debug, Clone)]
 pub(super) struct TransientResponse {
     coefficients: Coefficients,
-    /// Covariance of the real parts and then the imaginary parts of t before the prediction,
-    /// 2 modes × 2 modes.
+    /// Covariance, before the prediction, of the real and then the imaginary parts of t, the
+    /// changes of the modes over the record, 2 modes × 2 modes.
     pub prior: DMatrix<f64>,
     /// Inverse of `prior`.
     precision: DMatrix<Complex<f64>>,
@@ -260,8 +267,9 @@ impl TransientResponse {
         Some(Self { coefficients, prior, precision, span })
     }
 
-    /// Returns the lines for unit changes of each mode over the record, outputs × 2 modes: the real
-    /// changes first, the imaginary changes after them.
+    /// Returns the values of all outputs at one line for a unit change of each mode over the
+    /// record, outputs × 2 modes. The columns for real changes come first, then those for imaginary
+    /// changes.
     pub fn gains(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let [of_changes, of_forces] = self.parts(omega);
         of_changes + of_forces

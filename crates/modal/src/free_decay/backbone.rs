@@ -362,7 +362,8 @@ pub(super) fn backbone(
     best.map(|(_, backbone)| backbone)
 }
 
-/// Returns whether, by a linear prediction, the first step from a linear mode lowers the criterion.
+/// Returns whether the first step from a linear mode is expected to lower the criterion; the
+/// residual after the step is predicted linearly.
 fn is_promising(target: &Target<'_>, start: &Flow) -> bool {
     let expected_gain = || {
         let (fitted, jacobian) = (target.fitted(start.clone())?, target.jacobian(start)?);

@@ -47,7 +47,8 @@ pub enum FreeDecayError {
         samples: usize,
         /// Twice the gain in log-likelihood due to the best oscillation, a pure number.
         gained: f64,
-        /// Gain that a mode must exceed, a pure number.
+        /// Minimum increase of twice the log-likelihood for the acceptance of a mode, a pure
+        /// number.
         needed: f64,
     },
     /// A response is excited again, so that it is not one free decay.
@@ -84,7 +85,7 @@ pub enum FreeDecayError {
         /// Standard error of the rate, in 1/s.
         standard_error: f64,
     },
-    /// No search for the best fit (maximum likelihood, output error or a constant) converged.
+    /// No search for the maximum-likelihood fit converged.
     #[error(
         "the search for the best fit failed: {} reached no minimum within {steps} \
          steps. The record may not determine this number of modes: give fewer (`modes`), or use a longer \

@@ -141,7 +141,8 @@ struct Spread<'a> {
     poles: DMatrix<f64>,
     /// Derivatives of the linear unknowns of each channel with respect to the poles.
     slopes: Vec<DMatrix<f64>>,
-    /// Covariance (R⁻¹R⁻ᵀ) s² of the linear unknowns of each channel for known poles.
+    /// Covariance (R⁻¹R⁻ᵀ) s² of the linear unknowns of each channel for known poles, where R is
+    /// the triangular factor of their columns and s² is the noise variance.
     linear: Vec<DMatrix<f64>>,
     degrees_of_freedom: usize,
 }

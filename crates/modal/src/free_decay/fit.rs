@@ -40,7 +40,7 @@ pub(super) struct ChannelFit {
     pub linear: DVector<f64>,
     /// Sum of squares of the whitened residual.
     pub square: f64,
-    /// Triangular factor of the linear columns.
+    /// Triangular factor R of the whitened columns whose coefficients are `linear`.
     pub factor: DMatrix<f64>,
     /// Components of the derivatives in the space of the linear columns. The derivatives are those
     /// with respect to N·`growth` and N·`turn` of each pole, for N samples.

@@ -79,8 +79,8 @@ impl Subspace {
                 let sum = |i: usize, j: usize, from: usize, count: usize| {
                     x.rows(i * stride + from, count).dot(&y.rows(j * stride + from, count))
                 };
-                // Between neighbouring entries of a diagonal, the range of the sum moves by one
-                // stride, so only two short sums are computed.
+                // The samples of the sum move by one stride from one entry of a diagonal to the
+                // next. Therefore, two short sums suffice to update the sum.
                 for diagonal in 0..rows {
                     for (i0, j0) in [(diagonal, 0), (0, diagonal)] {
                         let mut value = sum(i0, j0, 0, columns);

@@ -127,8 +127,9 @@ pub fn free_decay(
                     needed,
                 });
             }
-            // A coloured noise model may absorb the effect of a second hit: the fits with white
-            // noise are compared.
+            // A coloured noise model may absorb the effect of a second hit. The search for a second
+            // hit therefore uses the fit with white noise, and the hit must lower the criterion by
+            // more than coloured noise does.
             let surplus = selected.white.criterion(&data) - selected.best.criterion(&data);
             excited_again = restart(&data, &selected.white.fit)
                 .filter(|(_, decrease)| *decrease > surplus)

@@ -31,8 +31,8 @@ pub fn complex_mode_indicator(
 }
 
 /// Returns the multivariate mode indicator function: for each line and each of q combinations of
-/// the forces, the power of the response in phase with the force, divided by the total power of the
-/// response. The values of a line are in rising order; the result is lines × q.
+/// the q forces, the power of the response in phase with the force, divided by the total power of
+/// the response. The values of a line are in rising order; the result is lines × q.
 ///
 /// A value falls from about 1 towards 0 where a real mode is in phase resonance. The responses are
 /// displacements or accelerations per unit force.
@@ -104,8 +104,8 @@ mod tests {
         let indicator = complex_mode_indicator(&responses(&[13.5, 10.0, 17.0])).unwrap();
         assert!(indicator[(1, 1)] > 0.3 * indicator[(1, 0)]);
         assert!(indicator[(2, 1)] < 0.05 * indicator[(2, 0)]);
-        // The response of the third mode alone, at its resonance, is |φ| |φ of the two inputs| / (2
-        // ζ ω²).
+        // The third mode without the other modes has at its resonance the response |φ| |φ_in| / (2
+        // ζ ω²), where φ_in contains the two entries of the shape φ at the inputs.
         let alone = 4.5f64.sqrt() * 0.5f64.sqrt() / (0.02 * 289.0);
         assert!((indicator[(2, 0)] / alone - 1.0).abs() < 0.05, "{}", indicator[(2, 0)]);
         assert!(indicator[(2, 0)] > 5.0 * indicator[(0, 0)]);

@@ -82,7 +82,7 @@ fn mac_of_views(a: DVectorView<'_, Complex<f64>>, b: DVectorView<'_, Complex<f64
 }
 
 /// Returns the MAC of every pair of columns of `a` (outputs × modes) and `b` (outputs × modes of
-/// another result): modes of `a` × modes of `b`.
+/// another result). The result has a row for each mode of `a` and a column for each mode of `b`.
 ///
 /// # Errors
 /// [`IndicatorError::Size`] if the numbers of outputs differ.
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn values_by_hand() {
-        // |1·3 + 2·(−1)|² / (5 · 10).
+        // The MAC is |1·3 + 2·(−1)|² / (5 · 10) = 0.02.
         let (a, b) = (shape(&[(1.0, 0.0), (2.0, 0.0)]), shape(&[(3.0, 0.0), (-1.0, 0.0)]));
         assert!((mac(&a, &b) - 0.02).abs() < 1e-15);
         let set = DMatrix::from_columns(&[a.clone(), b.clone()]);
@@ -219,7 +219,8 @@ mod tests {
         let normalised = uncertain.normalised();
         assert_eq!(normalised.shape()[0], Complex::from(1.0));
         assert_eq!(normalised.standard_errors()[0], 0.0);
-        // Both entries have an error of 0.1 in each part; |φ₂/φ₁|² = 0.98.
+        // The real part and the imaginary part of each entry have a standard error of 0.1, and
+        // |φ₂/φ₁|² = 0.98.
         let expected = (2.0f64 * 0.01 * (1.0 + 0.98)).sqrt();
         assert!((normalised.standard_errors()[1] - expected).abs() < 1e-12);
         assert_eq!(uncertain.normalised_to(2), None);

@@ -1,4 +1,4 @@
-//! Free decays that are known exactly, alone and under noise.
+//! Free decays that are known exactly, without noise and with noise.
 
 mod exact;
 mod noisy;

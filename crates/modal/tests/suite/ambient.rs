@@ -14,7 +14,8 @@ use nalgebra::{Complex, DMatrix, dmatrix};
 
 use crate::ambient_generator::{Noise, Quantity, Structure, moving_mean};
 
-/// Four modes, two of them 3 % apart, at four sensors, under three white forces.
+/// Returns a structure with four modes, four sensors and three white forces; two of the modes are 3
+/// % apart.
 fn tower() -> Structure {
     let shapes = dmatrix![
         0.3, 0.4, -0.8, 0.9;
@@ -100,7 +101,7 @@ fn good_accelerometers_lose_no_mode() {
     }
 }
 
-/// Three modes at one sensor.
+/// Returns a structure with three modes and one sensor.
 fn mast() -> Structure {
     Structure {
         frequencies_hz: vec![2.0, 4.7, 8.1],
@@ -135,8 +136,9 @@ fn intervals_hold_the_truth() {
     assert!(covered >= 61, "{covered} of {all}");
 }
 
-/// A moving mean over twelve samples has the same effect on the record as on the forces: the
-/// spectrum has four zeros in the band. The misfit must become significant.
+/// A record is filtered by a moving mean over twelve samples. It is then the response to filtered
+/// forces, whose spectrum has four zeros in the band. The misfit of the model must become
+/// significant, because the model has a flat spectrum of the forces.
 #[test]
 fn forces_whose_spectrum_is_not_flat_are_seen() {
     let record = mast().record(Quantity::Velocity, 30.0, 6000, 0.05, 60);
@@ -165,9 +167,9 @@ fn coloured_noise_does_not_bias_the_damping_of_a_long_record() {
     assert!(errors.iter().sum::<f64>().abs() < 6.0, "{errors:?}");
 }
 
-/// The noise of two records falls steeply with frequency: the first polynomials and a mode with a
-/// damping ratio of 15 % describe this noise better than the first polynomials alone. Only the four
-/// true modes must be found.
+/// The noise of two records falls steeply with frequency. A few polynomials of the noise do not
+/// describe it as well as the same polynomials with an additional, false mode whose damping ratio
+/// is 15 %. Only the four true modes must be found.
 #[test]
 fn noise_that_falls_steeply_is_no_mode() {
     let noise = Noise { level: 0.1, pole: 0.9 };
@@ -287,8 +289,8 @@ fn a_harmonic_is_named_and_left_out_on_request() {
     assert!((harmonic.amplitude / amplitude - 1.0).abs() < 0.1, "{harmonic:?}");
     assert!(harmonic.p_value < 1e-5 && harmonic.kurtosis < -1.0, "{harmonic:?}");
     assert_eq!((estimate.modes.len(), is_right(&estimate, &truth)), (4, 4));
-    // If the frequency of the harmonic is stated, hardly any of the record is lost: the damping
-    // ratios are the same as without the harmonic.
+    // If the frequency of the harmonic is stated, its removal must hardly change the damping
+    // ratios: they are those of the record without the harmonic, to 0.3 standard errors.
     let stated = AmbientSettings { without_hz: vec![frequency_hz], ..AmbientSettings::default() };
     let again = identified(&disturbed, stated);
     let undisturbed = identified(&record, AmbientSettings::default());
@@ -387,7 +389,7 @@ fn unusable_records_are_refused_with_their_numbers() {
     assert_eq!(refused(&good, &none), AmbientError::NoModesAsked);
 }
 
-/// White noise has no mode.
+/// A record of white noise must be refused, because no mode is significant.
 #[test]
 fn noise_alone_has_no_mode() {
     let sampling = Sampling::from_rate_hz(30.0, 3000).unwrap();

@@ -97,8 +97,8 @@ impl Structure {
         with_noise(data, rate_hz, noise.into(), seed)
     }
 
-    /// Returns a record of accelerations. It is one quarter of a steady state under forces that are
-    /// white up to 90 % of half the sampling rate.
+    /// Returns a record of accelerations. The record is one quarter of a period of the steady state
+    /// under periodic forces that are white up to 90 % of half the sampling rate.
     pub fn accelerations(
         &self,
         rate_hz: f64,
@@ -151,8 +151,9 @@ fn with_noise(mut data: DMatrix<f64>, rate_hz: f64, noise: Noise, seed: u64) -> 
     Record::new(Sampling::from_rate_hz(rate_hz, len).unwrap(), data).unwrap()
 }
 
-/// Returns the covariance of the real and imaginary parts of the modal states; `integral` is a
-/// function of the sum of two poles, λ_a + λ_b.
+/// Returns the covariance of the real and imaginary parts of the modal states. `integral` returns
+/// the integral of e^{(λ_a + λ_b)t} over the time in which the forces act, as a function of λ_a +
+/// λ_b.
 fn real_covariance(
     poles: &[Complex<f64>],
     power: &DMatrix<f64>,

@@ -62,7 +62,7 @@ fn constraints_that_name_no_channel_are_refused() {
 fn a_mode_that_changes_between_two_records_is_named() {
     let case = Case { samples: 4096, ..pair(8) };
     let mut warmer = case.clone();
-    // A change of 0.2 % is forty standard errors.
+    // The second natural frequency changes by 0.2 %, which is forty of its standard errors.
     warmer.frequency_hz[1] *= 0.998;
     let estimate =
         |case: &Case, seed| identify_modes(&case.lines(seed), &ModalSettings::default()).unwrap();

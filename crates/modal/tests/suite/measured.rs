@@ -76,8 +76,8 @@ fn modes_of_a_part_predict_the_rest() {
     }
 }
 
-/// Reference: 212.0925 Hz, printed by the toolbox that distributes the response, for its own fit of
-/// one degree of freedom; two lines are 0.3125 Hz apart.
+/// Reference: 212.0925 Hz. The toolbox that contains the measured response prints this natural
+/// frequency for its own fit of one degree of freedom. Neighbouring lines are 0.3125 Hz apart.
 #[test]
 fn a_cantilever_has_one_mode_near_its_printed_frequency() {
     let Some(rows) = rows("beam-frf/beam_frf.csv") else { return };

@@ -48,9 +48,9 @@ fn table(along: f64, seed: u64) -> LineData {
 
 /// Under independent noise, 76 of 80 intervals of frequency and damping ratio contain the true
 /// value on average, with a standard deviation of 2, and the ratio of the scatter along the shape
-/// is near 1. Under a common error of all outputs, which no noise model describes, fewer intervals
-/// contain this value. If the variances are multiplied by the ratio, more intervals contain the
-/// true value, but fewer than 95 %.
+/// to its expected value is near 1. Under a common error of all outputs, which no noise model
+/// describes, fewer intervals contain the true value. If the variances are multiplied by this ratio
+/// of the scatter, more intervals contain the true value, but fewer than 95 %.
 #[test]
 fn the_scatter_shows_outputs_that_move_together() {
     for along in [0.0, 0.05] {

@@ -147,7 +147,7 @@ impl Score {
         self.frequency.0[place].push((f.value - case.frequency_hz[truth], f.standard_error));
         self.damping.0[place].push((z.value - case.damping[truth], z.standard_error));
         // The true modal mass is φ²/ψ²: the residue at the driving point gives ψ², and φ is the
-        // entry of the shape there when the largest entry is 1.
+        // entry of the shape at this point. The largest entry of the shape is 1.
         let is_largest = |value: &C| (value - 1.0).norm() < 1e-12;
         let largest = mode.shape.iter().position(is_largest).unwrap_or(0);
         let shape = &case.shape[truth];

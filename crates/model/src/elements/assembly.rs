@@ -11,7 +11,8 @@ use crate::{Matrix, ModelError, SecondOrderSystem};
 pub struct MachineParameter {
     /// Name of the shared parameter, or of the element and its coefficient.
     pub name: String,
-    /// SI unit for translations; for rotations it is N·m/rad instead of N/m, and so on.
+    /// SI unit for translations. The unit for rotations differs: for a stiffness it is N·m/rad
+    /// instead of N/m.
     pub unit: &'static str,
     /// Initial value of the search, in the unit of the parameter.
     pub start: f64,
@@ -57,12 +58,12 @@ pub struct Assembly {
 }
 
 impl Assembly {
-    /// Creates an assembly from terms, sensors and inputs by index, for models without named
-    /// elements: entries of M, C and K.
+    /// Creates an assembly from terms, sensors and inputs by index, for models whose parameters are
+    /// entries of M, C and K instead of coefficients of named elements.
     ///
     /// # Errors
-    /// [`ModelError::EntryOutside`] for a degree of freedom or a parameter that does not exist; in
-    /// the error it is counted from 1.
+    /// [`ModelError::EntryOutside`] for the index of a degree of freedom or of a parameter that
+    /// does not exist; the error counts the index from 1.
     pub fn from_terms(
         dofs: Vec<String>,
         terms: Vec<Term>,

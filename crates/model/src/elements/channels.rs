@@ -23,8 +23,9 @@ pub struct SensorRow {
 }
 
 impl SensorRow {
-    /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m,
-    /// including the known delay and, from `parameters` (in their units), the unknown delay.
+    /// Returns the reading per displacement at `omega` (rad/s), in the unit of the quantity per m.
+    /// Its phase includes the known delay and the unknown delay, whose value is one of the
+    /// `parameters` (each in its unit).
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 2.2 (a delay τ changes the phase by

@@ -34,7 +34,8 @@ pub enum Element {
     Bearing(Box<Bearing>),
     /// Known matrices of a part of the machine, each multiplied by a factor.
     Matrices(Box<MatrixElement>),
-    /// Unknown residual unbalance, m e, of a rotor at speed Ω: the force Ω² U in x and −iΩ² U in y.
+    /// Residual unbalance U = m e of a rotor, known or unknown. At the speed Ω it causes the force
+    /// Ω² U in x and −iΩ² U in y.
     Unbalance {
         /// Degrees of freedom in the directions x and y; the rotor turns from x to y.
         at: [String; 2],

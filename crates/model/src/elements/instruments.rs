@@ -54,7 +54,8 @@ pub enum Input {
         /// Measured quantity.
         quantity: ResponseQuantity,
     },
-    /// Trial unbalance m e (kg·m) with its phase: the force Ω² U in x and −iΩ² U in y.
+    /// Trial unbalance U = m e (kg·m) with its phase: at the speed Ω it causes the force Ω² U in x
+    /// and −iΩ² U in y.
     Unbalance {
         /// Name of the input and its channel.
         name: String,
@@ -77,7 +78,7 @@ pub enum Speed {
     Synchronous,
 }
 
-/// Sensors and inputs in the order of the channels of outputs and inputs.
+/// Sensors in the order of the output channels, and inputs in the order of the input channels.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]

@@ -5,7 +5,7 @@ use super::{Assembly, Coefficient, Element, FreeCoefficient, Instruments, Machin
 /// Damping in proportion to masses and stiffnesses: C = αM + βK, and K (1 + iη).
 ///
 /// It applies to masses, links and matrices; bearings and other 2 × 2 blocks have separate damping.
-/// α acts on the motion relative to the support.
+/// The damping αM acts on the motion relative to the support.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -55,14 +55,14 @@ impl Machine {
         Self { dofs: dofs.into_iter().map(Into::into).collect(), ..Self::default() }
     }
 
-    /// Returns the machine with another element.
+    /// Returns the machine with one more element.
     #[must_use]
     pub fn with(mut self, name: &str, element: Element) -> Self {
         self.elements.push((name.to_owned(), element));
         self
     }
 
-    /// Returns the machine with another unknown that coefficients may share.
+    /// Returns the machine with one more unknown, which several coefficients may share.
     #[must_use]
     pub fn with_parameter(mut self, name: &str, parameter: FreeCoefficient) -> Self {
         self.parameters.push((name.to_owned(), parameter));

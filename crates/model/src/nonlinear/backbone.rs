@@ -59,7 +59,8 @@ impl UncertainNonlinearSystem {
     ) -> Result<Vec<BackbonePoint>, ModelError> {
         let (mut motion, dof) = start(self.system(), mode)?;
         let balance = Balance::new(self.system());
-        // The initial motion is a linear mode, whose amplitude is arbitrary.
+        // The initial motion is a linear mode, which is the motion in the limit of zero amplitude.
+        // Its scale is arbitrary.
         let (mut points, mut reached) = (Vec::new(), 0.0);
         for &amplitude in amplitudes {
             require("amplitude of a backbone", amplitude, "positive", amplitude > 0.0)?;
@@ -80,8 +81,8 @@ impl UncertainNonlinearSystem {
         motion: &Motion,
         dof: usize,
     ) -> Result<Option<f64>, ModelError> {
-        // ω changes by −(last row of J⁻¹) ∂R/∂θ, so one solution with the transpose is enough for
-        // all parameters.
+        // ω changes by −(last row of J⁻¹) ∂R/∂θ, so one solution with Jᵀ is enough for all
+        // parameters.
         let jacobian = balance.jacobian(motion, dof);
         let mut last = DVector::zeros(jacobian.nrows());
         last[jacobian.nrows() - 1] = 1.0;
@@ -132,7 +133,7 @@ fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), Model
     Ok((Motion { cosines, omega: mode.damped_frequency() }, dof))
 }
 
-/// Balance of the harmonics of a free undamped motion.
+/// Harmonic balance of a free undamped motion.
 struct Balance<'a> {
     system: &'a NonlinearSystem,
     /// Values of cos hτ: instants × (harmonics + 1).
@@ -307,7 +308,8 @@ mod tests {
             assert!((point.omega / omega - 1.0).abs() < 1e-8, "{point:?}, {omega}");
             assert_eq!(point.standard_error, 0.0);
         }
-        // The largest amplitude alone gives the same point as after the smaller amplitudes.
+        // The point at the largest amplitude must be the same if the smaller amplitudes are not
+        // requested.
         let alone = known.backbone(0, &amplitudes[3..]).unwrap();
         assert!((alone[0].omega / points[3].omega - 1.0).abs() < 1e-10);
     }

@@ -298,7 +298,7 @@ mod tests {
                     (law.value(q, v + h) - law.value(q, v - h)) / (2.0 * h),
                 ];
                 for (exact, difference) in law.slopes(q, v).into_iter().zip(central) {
-                    // The error of the difference is in proportion to h² times the third
+                    // The error of the central difference is in proportion to h² times the third
                     // derivative, plus rounding divided by h.
                     assert!((exact - difference).abs() < 1e-5, "{law:?} at {q}, {v}");
                 }

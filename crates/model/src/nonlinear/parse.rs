@@ -162,7 +162,8 @@ impl Parser {
         begins
     }
 
-    /// Parses `x1`, `v1^3`, `(x1-x2)^2`, `|v1|`, with a `*` before or after it.
+    /// Parses one factor of a product, such as `x1`, `v1^3`, `(x1-x2)^2` or `|v1|`, and a `*` after
+    /// it if there is one.
     fn factor(&mut self, product: &mut Product) -> Result<(), String> {
         let absolute = self.take('|');
         let (letter, coordinate) = self.variable()?;
@@ -217,7 +218,7 @@ impl Parser {
         }
     }
 
-    /// Returns b of `(1+(v1/b)^2)`.
+    /// Parses the divisor `(1+(v1/b)^2)` and returns its constant b.
     fn saturation(&mut self, coordinate: Coordinate) -> Result<f64, String> {
         let form = || "only (1 + (v/b)^2), with the same v as in v^3, can follow /".to_owned();
         for c in ['(', '1', '+', '('] {

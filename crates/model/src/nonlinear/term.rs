@@ -80,8 +80,9 @@ impl Term {
     /// Creates a term from the name of its coefficient, its coordinate, and its law.
     ///
     /// # Errors
-    /// [`ModelError::Term`] unless the name begins with a letter, has only letters, digits and `_`,
-    /// and the difference is between two different degrees of freedom.
+    /// [`ModelError::Term`] if the name does not begin with a letter, or contains a character other
+    /// than letters, digits and `_`, or if the coordinate is the difference of a degree of freedom
+    /// with itself.
     pub fn new(
         name: impl Into<String>,
         coordinate: Coordinate,
@@ -200,7 +201,7 @@ impl Terms {
     /// Creates a list of terms.
     ///
     /// # Errors
-    /// [`ModelError::RepeatedTerm`] if two have the same name.
+    /// [`ModelError::RepeatedTerm`] if two terms have the same name.
     pub fn new(terms: Vec<Term>) -> Result<Self, ModelError> {
         let mut names = HashSet::with_capacity(terms.len());
         if let Some(repeated) = terms.iter().find(|term| !names.insert(term.name.as_str())) {
@@ -242,8 +243,8 @@ impl Terms {
     /// Checks that the terms belong to a system of `dof` degrees of freedom.
     ///
     /// # Errors
-    /// [`ModelError::Term`] if one of them names another degree of freedom, or has the name of an
-    /// entry of M, C or K.
+    /// [`ModelError::Term`] if a term has a degree of freedom that the system does not have, or if
+    /// its name is the name of an entry of M, C or K.
     pub fn check_dof(&self, dof: usize) -> Result<(), ModelError> {
         for term in &self.0 {
             let refused = |reason: String| Err(ModelError::Term { text: term.to_string(), reason });

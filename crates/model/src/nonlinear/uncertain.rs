@@ -24,7 +24,7 @@ pub enum NonlinearParameter {
 
 impl NonlinearParameter {
     /// Returns the parameter of this name: `k12`, the name of a term, or `c3.b` for the constant b
-    /// inside a term.
+    /// inside the term `c3`.
     ///
     /// # Errors
     /// [`ModelError::NoSuchParameter`] if the system has no parameter of this name.
@@ -121,7 +121,7 @@ impl UncertainNonlinearSystem {
     /// parameter, in the products of their units.
     ///
     /// # Errors
-    /// [`ModelError::CovarianceShape`] unless it has one row and column per parameter,
+    /// [`ModelError::CovarianceShape`] unless the covariance has this shape,
     /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
     /// [`ModelError::RepeatedParameter`] if a parameter is named twice, and the errors of
     /// [`NonlinearSystem::changed`] if the system does not have one of the parameters.
@@ -153,8 +153,8 @@ impl UncertainNonlinearSystem {
         &self.parameters
     }
 
-    /// Covariance of the uncertain parameters, one row and column each, in the products of their
-    /// units.
+    /// Covariance of the uncertain parameters, with one row and one column per parameter, in the
+    /// products of the units of the parameters.
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }

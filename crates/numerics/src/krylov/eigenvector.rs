@@ -20,7 +20,8 @@ pub fn eigenvector(
     number: usize,
 ) -> Option<DVector<Complex<f64>>> {
     let size = matrix.nrows();
-    // The shift differs from the eigenvalue by a rounding error, so that the factors exist.
+    // The shift differs from the eigenvalue by about one rounding error, so that the shifted matrix
+    // is not singular and has factors.
     let shift = value + Complex::from(f64::EPSILON * matrix.norm().max(f64::MIN_POSITIVE));
     let factors = HessenbergFactors::new(matrix, below, shift);
     let mut vector = numbered_start_vector(size, number).map(Complex::from);

@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Maximum length of a list that is written with all decimal digits; longer lists are evenly spaced
-/// or in single precision.
+/// Maximum length of a list that is written with all decimal digits. A longer list is written as
+/// its first value, last value and length if it is evenly spaced, otherwise in single precision.
 const EXACT: usize = 100;
 
-/// Maximum deviation of an evenly spaced list from its step, in steps.
+/// Maximum deviation of a value from even spacing, in steps, for which a list counts as evenly
+/// spaced.
 const EVEN: f64 = 1e-9;
 
 /// Lists of numbers for a page, encoded as text; equal lists are stored once.

@@ -59,7 +59,8 @@ impl FigureSet {
     /// be different for each set, and `label` is its name for screen readers.
     ///
     /// # Errors
-    /// [`PlotError::NoPanels`] without figures; as [`Figure::to_svg`] for each.
+    /// [`PlotError::NoPanels`] if the set has no figures; otherwise the errors of
+    /// [`Figure::to_svg`] for each figure.
     pub fn draw(&self, ids: &str, label: &str) -> Result<DrawnSet, PlotError> {
         let Some((_, first)) = self.members.first() else {
             return Err(PlotError::NoPanels { figure: label.to_owned() });

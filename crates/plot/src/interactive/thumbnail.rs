@@ -1,4 +1,5 @@
-//! Small drawings for the choice of a figure; the style sheet shows their numbers in print only.
+//! Small drawings for the choice of a figure; the style sheet shows the numbers of their axes in
+//! print only.
 
 use crate::axis::Mapping;
 use crate::canvas::{Anchor, Canvas, Stroke, TextStyle};

@@ -1,4 +1,4 @@
-//! Responses of the sensors over frequency, measured and of the identified system.
+//! Responses of the sensors over frequency, measured and computed with the identified system.
 
 use mechid_analysis::IdentifiedElements;
 use mechid_analysis::elements::SensorSpectrum;

@@ -216,8 +216,8 @@ impl ToFigure for Identified {
 }
 
 impl ToFigure for IdentifiedResponses {
-    /// Draws measured and identified receptance, both with the exponential window of the table if
-    /// it has one.
+    /// Draws measured and identified receptance. If the table has an exponential window, both
+    /// include the damping that this window adds.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
         let system = self.fitted().system().map_err(AnalysisError::from)?;
@@ -322,8 +322,8 @@ impl ToFigure for Modes {
 }
 
 impl ToFigure for IdentifiedElements {
-    /// Draws the responses of the first sensors over frequency, measured and of the identified
-    /// system.
+    /// Draws the responses of the first sensors over frequency, measured and computed with the
+    /// identified system.
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(elements::figure(self))
     }

@@ -32,8 +32,8 @@ const BESIDE: u32 = 40;
 /// No point is at the resonance itself, because an undamped system has no receptance there.
 const BESIDE_WIDTHS: (f64, f64) = (0.05, 20.0);
 
-/// Minimum damping ratio for the width of a peak: a sharper resonance is truncated at 1e5 times the
-/// response without resonance.
+/// Minimum damping ratio for the width of a peak. With less damping, a peak is drawn only up to 1e5
+/// times the response without resonance.
 const SHARPEST: f64 = 1e-4;
 
 /// Maximum ratio of a natural frequency that counts as zero to the highest natural frequency.

@@ -1,5 +1,5 @@
-//! Responses over frequency, measured and explained by modes, stabilisation diagram and mode
-//! indicator.
+//! Stabilisation diagram, mode indicator, and responses over frequency (measured, and explained by
+//! modes).
 
 use mechid_analysis::Modes;
 use mechid_analysis::modes::{Diagrams, ModeIndicator, StabilisationRows};

@@ -192,8 +192,9 @@ fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
 /// One column of H, with its angular frequency.
 type Column = (f64, DVector<Complex<f64>>);
 
-/// Returns H = X F⁻¹ at each frequency at which as many rows as degrees of freedom have independent
-/// forces. Frequencies at which only one force acts in each row are omitted.
+/// Returns H = X F⁻¹ at each frequency for which the number of rows equals the number of degrees of
+/// freedom and the forces of these rows are independent. Frequencies at which only one force acts
+/// in each row are omitted.
 fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatrix<Complex<f64>>)> {
     let dof = data.dof();
     let mut rows: Vec<usize> = (0..data.len()).collect();

@@ -32,8 +32,8 @@ fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
 }
 
 /// Returns an angle on the branch nearest to another angle, both in degrees. If two branches are
-/// equally near, as at a resonance of an undamped system, returns the smaller angle, and −180° for
-/// ±180°.
+/// equally near, as at a resonance of an undamped system, returns the angle with the smaller
+/// magnitude, and −180° instead of 180°.
 fn next_to(other: f64, angle: f64) -> f64 {
     let near = angle - 360.0 * ((angle - other) / 360.0).round();
     let beyond = near - (near - other).signum() * 360.0;
@@ -57,7 +57,8 @@ impl Trace {
         })
     }
 
-    /// Creates points (ω, H), with continuous phases on the branch of another curve.
+    /// Creates the curve of points (ω, H). Each phase is on the branch nearest to the phase of
+    /// another curve at about the same frequency.
     pub fn beside(
         style: FigureStyle,
         curve: &Self,

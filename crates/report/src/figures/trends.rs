@@ -125,7 +125,8 @@ mod tests {
 
     use super::*;
 
-    /// A figure must be drawn if some values have no standard error; the bands omit these values.
+    /// A figure must be drawn even if some values have no standard error; the bands omit these
+    /// values.
     #[test]
     fn values_without_an_interval_are_drawn_as_points() {
         let row = |number: usize| {

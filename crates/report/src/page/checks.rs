@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::{CheckRow, When};
 
-/// Returns a sentence for each conspicuous check, which makes the results doubtful.
+/// Returns a sentence for each conspicuous check. A conspicuous check makes the results doubtful.
 pub fn conspicuous(checks: &[CheckRow]) -> Vec<String> {
     let doubtful = checks.iter().filter(|check| check.is_conspicuous());
     doubtful.map(|check| format!("{}: {}", check.subject, check.sentence())).collect()

@@ -34,8 +34,8 @@ use crate::ReportError;
 /// Style sheet, included in the page so that it needs no other file.
 const STYLE: &str = include_str!("style.css");
 
-/// Returns the head of a page: it loads no other file and runs only the script of the figures, even
-/// if a name in a record contains HTML.
+/// Returns the head of a page. Its content security policy ensures that the page loads no other
+/// file and runs only the script of the figures, even if a name in a record contains HTML.
 fn head(title: &str) -> Markup {
     html! {
         head {

@@ -21,8 +21,8 @@ use crate::figures::backbone;
 use crate::figures::modes::diagrams;
 use crate::figures::shapes::ModeShapes;
 
-/// Returns a page of a result with modes, its figure, if there is one, and its shapes: HTML that
-/// loads no other file and runs only the script of its figures.
+/// Returns a page of a result with modes, as HTML that loads no other file and runs only the script
+/// of its figures. The page shows the mode shapes and, if there is one, the figure of the result.
 ///
 /// # Errors
 /// [`ReportError::Plot`] if a figure cannot be drawn.

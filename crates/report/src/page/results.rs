@@ -293,7 +293,7 @@ fn facts_of_force(found: &ForceSummary) -> Vec<Vec<String>> {
     if let Some(band) = found.band_hz {
         let [low, high] = band.map(|hz| significant(hz, 4));
         facts.push(pair(
-            "Frequency band of the force and its standard error",
+            "Frequency band of the force and of its standard error",
             format!("{low} to {high} Hz"),
         ));
     }

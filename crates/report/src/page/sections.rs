@@ -30,7 +30,7 @@ fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "–".into())
 }
 
-/// Returns modulus and phase, from −179.9° to 180.0°.
+/// Returns the modulus and the phase as text; the phase is −179.9° to 180.0°.
 pub fn polar(re: f64, im: f64) -> String {
     let tenths = (10.0 * im.atan2(re).to_degrees()).round();
     let tenths = if tenths == -1800.0 { 1800.0 } else { tenths + 0.0 };

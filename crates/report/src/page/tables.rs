@@ -35,7 +35,8 @@ impl Table<'_> {
         self.html_with_class(Some("sort"), &[])
     }
 
-    /// Returns a sortable table in which rows can be chosen by their categories, one for each row.
+    /// Returns a sortable table in which rows can be chosen by category; `categories` has one
+    /// category for each row.
     #[cfg(feature = "parquet")]
     pub fn html_with_categories(&self, categories: &[String]) -> Markup {
         self.html_with_class(Some("sort"), categories)

@@ -43,8 +43,8 @@ pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mu
 /// stationary point.
 fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Point> {
     let derivatives = objective.derivatives(&from.phases, &from.signal, p);
-    // The damping is a multiple of the identity (Levenberg), because a common shift in time has
-    // zero curvature.
+    // A shift in time, common to all lines, does not change the norm, so the curvature in this
+    // direction is zero. A multiple of the identity (Levenberg) damps this direction, too.
     let scale = derivatives.mean_curvature();
     let hessian = (from.phases.len() <= limits::DENSE_HESSIAN).then(|| derivatives.hessian());
     while *damping < limits::LARGEST_DAMPING {
@@ -121,7 +121,8 @@ mod tests {
         let step = conjugate_gradients(&derivatives, added).unwrap();
         let residual = full * &step + added * &step - &derivatives.gradient;
         assert!(residual.norm() <= 1.001 * limits::CG_RESIDUAL * derivatives.gradient.norm());
-        // Without damping, a point that is not a minimum has negative curvature.
+        // With negative damping, conjugate gradients must stop at a direction of negative
+        // curvature.
         assert!(conjugate_gradients(&derivatives, -added).is_none());
     }
 }

@@ -93,9 +93,9 @@ impl PNorm {
 pub(super) struct Derivatives<'a> {
     norm: &'a PNorm,
     pub(super) gradient: DVector<f64>,
-    /// Second term of the Hessian, which is diagonal.
+    /// Diagonal entries of the second term of the Hessian; this term has no other entries.
     own: Vec<f64>,
-    /// (A_n / s) exp(i φ_n).
+    /// Complex amplitude (A_n / s) exp(i φ_n) of each line, relative to the peak s.
     turned: Vec<Complex<f64>>,
     /// (x/s)^(p−2).
     weight: Vec<f64>,

@@ -29,7 +29,8 @@ pub fn refined_errors(
     Ok(percent(&estimates, case.machine))
 }
 
-/// Errors in per cent of damped frequency, damping ratio and shape ratio of both modes.
+/// Errors, in per cent, of the damped frequency, the damping ratio and the shape ratio of both
+/// modes.
 ///
 /// # Errors
 /// The message of the step that fails.

@@ -80,8 +80,8 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Returns the errors in % against NPI of one column, for one parameter of a table with
-    /// several.
+    /// Returns pairs of NPI and error in % for one column and one parameter of a table; the table
+    /// has several parameters.
     pub fn series_of(&self, table: &str, parameter: &str, method: Method) -> Vec<(f64, f64)> {
         self.evidence
             .rows(table)
@@ -91,12 +91,12 @@ impl View<'_> {
             .collect()
     }
 
-    /// Errors in % against NPI of one column.
+    /// Pairs of NPI and error in %, for one column.
     pub fn series(&self, table: &str, method: Method) -> Vec<(f64, f64)> {
         self.column(table, method).filter_map(|r| Some((r.cell.npi?, self.error_of(r)?))).collect()
     }
 
-    /// Signed deviations from the truth in % against NPI of one column.
+    /// Pairs of NPI and signed deviation from the true value in %, for one column.
     pub fn deviations(&self, table: &str, method: Method) -> Vec<(f64, f64)> {
         let deviation = |r: &Row| {
             let value = match self.source {
@@ -109,12 +109,12 @@ impl View<'_> {
         self.column(table, method).filter_map(deviation).collect()
     }
 
-    /// Errors in % of our best estimator against NPI of one column.
+    /// Pairs of NPI and error in % for one column, with the errors of our best estimator.
     pub fn best(&self, table: &str, method: Method) -> Vec<(f64, f64)> {
         self.column(table, method).filter_map(|r| Some((r.cell.npi?, r.best_error))).collect()
     }
 
-    /// Printed errors in % of a table that names no integrator.
+    /// Printed errors, in %, in a table that names no integrator.
     pub fn unspecified(&self, table: &str, parameter: &str) -> Vec<f64> {
         let cells = self.evidence.published.table(table);
         cells
@@ -123,7 +123,7 @@ impl View<'_> {
             .collect()
     }
 
-    /// Printed errors in % of one column of a table that cannot be replayed.
+    /// Printed errors, in %, in one column; for tables that cannot be replayed.
     pub fn printed_errors(&self, table: &str, method: Method) -> Vec<f64> {
         let cells = self.evidence.published.table(table).filter(|c| c.method == method);
         cells.filter_map(|c| c.error_percent.parse().ok()).collect()

@@ -58,7 +58,7 @@ pub fn identified(
     }
 }
 
-/// Errors of [`identified`] in per cent.
+/// Errors, in per cent, of the estimates that [`identified`] returns.
 ///
 /// # Errors
 /// The errors of [`identified`].
@@ -71,7 +71,8 @@ pub fn errors(
     Ok(percent(&identified(source, case, method, domain)?, case.machine))
 }
 
-/// Errors in per cent of least squares on the lines 1 … `last` of a motion without slips.
+/// Errors, in per cent, of the least-squares estimates from the spectral lines 1 … `last` of a
+/// motion that is simulated without slips.
 ///
 /// # Errors
 /// The message of the estimator.
@@ -234,7 +235,7 @@ pub fn force(
     Ratios::new(&sequences, &machine, equation)
 }
 
-/// The single degree of freedom at 256 samples.
+/// The single degree of freedom, with 256 samples per period.
 pub fn sdof(npi: f64) -> Case {
     Case { machine: Machine::SDOF, nt: 256, npi }
 }

@@ -146,7 +146,8 @@ fn lessons(evidence: &Evidence) -> Result<String, String> {
     ))
 }
 
-/// Compares step sizes: the larger of the errors in K and C with the exact discretisation.
+/// Returns the section of the audit page on the step size: a table of the larger one of the errors
+/// in K and C, as estimated with the exact discretisation.
 fn steps(evidence: &Evidence) -> String {
     let view = evidence.corrected();
     let at = |t, m, npi: f64| {

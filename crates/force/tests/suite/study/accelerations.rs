@@ -6,8 +6,9 @@ use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::DMatrix;
 
-/// Returns masses of 20 kg in a row, connected by springs, the first one to the ground. One mass on
-/// one spring has the natural frequency `hz` and 3 % of critical damping.
+/// Returns a row of masses of 20 kg, connected by springs; one more spring connects the first mass
+/// to the ground. A single mass on a single spring would have the natural frequency `hz` and 3 % of
+/// critical damping.
 pub fn row(dof: usize, hz: f64) -> SecondOrderSystem {
     let omega = std::f64::consts::TAU * hz;
     let (mass, stiffness) = (20.0, 20.0 * omega * omega);
@@ -24,16 +25,17 @@ pub fn row(dof: usize, hz: f64) -> SecondOrderSystem {
 /// Result for one record: the identified force compared with the true force.
 pub struct Found {
     pub band_hz: [f64; 2],
-    /// RMS values of error and force within the band, in N.
+    /// RMS value of the error of the force within the band, in N; `size` is the RMS value of the
+    /// true force.
     pub error: f64,
     pub size: f64,
     /// Share of samples whose error is at most 1.96 standard errors.
     pub held: f64,
 }
 
-/// Identifies a force on the last mass: about 336 N, with lines from 0.2 to 60 Hz. The
+/// Identifies a force of about 336 N RMS on the last mass, with lines from 0.2 to 60 Hz. The
 /// accelerations are 1024 samples at 200 Hz of a steady state in closed form, with white noise of
-/// `level` times the size of each acceleration.
+/// `level` times the RMS value of each acceleration.
 pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     let system = row(dof, hz);
     let sampling = Sampling::new(0.005, 1024).unwrap();
@@ -62,8 +64,8 @@ pub fn found(dof: usize, hz: f64, level: f64, seed: u64) -> Found {
     }
 }
 
-/// Returns the table of the book: machines, noise, band, error and coverage over this many records
-/// each.
+/// Prints the table of the book: machines, noise, band, error and coverage. Each row is computed
+/// from `runs` records.
 pub fn table(runs: u64, print: impl Fn(&str)) {
     print("| Masses | Natural frequency | Noise | Shown from | RMS error | in 95 % intervals |");
     print("|---|---|---|---|---|---|");

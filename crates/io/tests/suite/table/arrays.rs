@@ -86,7 +86,7 @@ fn structs_that_are_promised_and_not_there_are_refused() {
     let file = one_variable(2, &[(5, &sizes), (1, b"s"), (5, &length), (1, b"x\0")]);
     let error = Table::parse("a.mat", &file).unwrap_err().to_string();
     assert!(error.contains("ends before its elements"), "{error}");
-    // Structs without fields have no contents, for any number of them.
+    // An array of structs without fields has no contents, whatever its size.
     let file = one_variable(2, &[(5, &sizes), (1, b"s"), (5, &length), (1, b"")]);
     let error = Table::parse("a.mat", &file).unwrap().column("s").unwrap_err().to_string();
     assert!(error.contains("nothing"), "{error}");

@@ -43,8 +43,8 @@ fn data_sets_are_columns_with_the_units_and_rates_of_their_attributes() {
     assert_eq!(si("run 1/motion[1]", Quantity::DISPLACEMENT), 1e-3);
     assert_eq!(si("run 1/motion[2]", Quantity::DISPLACEMENT), 1e-6);
     assert!((si("run 2/acc", Quantity::ACCELERATION) - 9.80665).abs() < 1e-12);
-    // The instants follow from a rate in the group of the data sets, from their own time column, or
-    // from their own step.
+    // The time axis follows from the rate that the group `run 1` states, from the data set `time`
+    // in the group `run 2`, or from the step that the data set `counts` states.
     for names in [&["run 1/force", "run 1/motion[2]"][..], &["run 2/acc"], &["counts"]] {
         let record = table.record(&TimeAxis::OfFile, names).unwrap();
         assert_eq!((record.len(), record.sampling().dt()), (8, 0.25), "{names:?}");

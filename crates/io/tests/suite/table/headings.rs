@@ -41,7 +41,8 @@ fn a_comment_above_the_table_names_its_columns() {
         );
         assert_eq!(table.to_si(1, Quantity::Force).unwrap(), 1.0, "{text}");
     }
-    // Comments that are not names: they have another number of words, or numbers.
+    // These comments are not names of columns: the first has two words for three columns, and the
+    // second has numbers.
     for text in [format!("# rig 4\n{ROWS}"), format!("# 1,2,3\n{ROWS}")] {
         assert_eq!(three(&text).names(), ["", "", ""], "{text}");
     }

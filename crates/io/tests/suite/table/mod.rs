@@ -105,7 +105,8 @@ fn a_column_is_found_by_its_name_before_the_unit() {
     for (wanted, column) in [("Fy", 2), ("Fx", 3), ("Fx [N]", 1), ("x", 4), ("a", 5), ("Time", 0)] {
         assert_eq!(t.find(wanted).unwrap(), column, "{wanted}");
     }
-    // A name has priority over a number, even without its unit.
+    // `2` means the column with the name `2 [V]`, not the second column: a name has priority over a
+    // number, also if its unit is omitted.
     assert_eq!((t.find("2").unwrap(), t.find("3").unwrap()), (6, 2));
     let t = table("F [N],F (kN)\n0,1\n");
     assert_eq!(
@@ -230,7 +231,8 @@ fn utf16_is_read_in_either_byte_order() {
         assert_eq!(table.column("t [µs]").unwrap(), [0.0, 1.0]);
         let e = table.column("κ").unwrap_err().to_string();
         assert_eq!(e, "a.txt, line 3, column 2 \"κ\": \"−\" is not a number");
-        // The file ends within the last line break: the remaining byte belongs to the last field.
+        // The file ends after the first of the two bytes of its last character, a line break: this
+        // byte belongs to the last field.
         bytes.pop();
         let e = Table::parse("a.txt", &bytes).unwrap().column("κ").unwrap_err().to_string();
         assert!(e.starts_with("a.txt, line 3, column 2 \"κ\": \"−\\r\u{fffd}\" is not"), "{e}");

@@ -146,7 +146,7 @@ fn a_block_begins_where_it_is_told_to() {
         assert_eq!(at(0..20, 8, 8), [(1.0, 8), (9.0, 8), (17.0, 4)]);
         assert_eq!(at(4..12, 4, 4), [(5.0, 4), (9.0, 4)]);
         assert_eq!(at(0..20, 50, 50), [(1.0, 20)]);
-        // A further block is passed only if it has a row that was not passed before.
+        // A further block is given only if it has a row that no earlier block had.
         assert_eq!(at(0..9, 5, 4), [(1.0, 5), (5.0, 5)]);
         assert_eq!(at(0..10, 5, 4), [(1.0, 5), (5.0, 5), (9.0, 2)]);
     }
@@ -170,13 +170,14 @@ proptest! {
     ) {
         let (_folder, path) = written(&text(9201));
         let advance = 1 + (share * (rows - 1) as f64) as usize;
-        // Short advances of long blocks take much time and add no further test.
+        // Long blocks with a short advance would take much time, and they would not test anything
+        // else.
         prop_assume!(len / advance < 500);
         let [whole, part] = both(&path);
         let window = start..start + len;
         let expected = blocks(&whole, window.clone(), rows, advance).unwrap();
         prop_assert_eq!(&blocks(&part, window.clone(), rows, advance).unwrap(), &expected);
-        // If the blocks do not overlap, every sample is passed once.
+        // If the blocks do not overlap, every sample is in exactly one block.
         if advance == rows {
             prop_assert_eq!(expected.iter().map(DMatrix::nrows).sum::<usize>(), len);
         }

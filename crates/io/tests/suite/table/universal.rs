@@ -82,7 +82,8 @@ fn single_precision_is_read_printed_and_binary() {
 #[test]
 fn what_is_no_real_function_of_time_is_refused() {
     for table in both() {
-        // The name belongs to the response; the frequency response function has another name.
+        // `12+Z` is the name of a response; the frequency response function has the name
+        // `12+Z/1-X`.
         let e = table.column("12+Z/1-X").unwrap_err().to_string();
         assert!(e.contains("it holds a frequency response function, but a channel needs"), "{e}");
         let e = table.column("3").unwrap_err().to_string();

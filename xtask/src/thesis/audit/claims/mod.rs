@@ -242,7 +242,7 @@ fn below(view: &View, table: &str, method: Method, others: &[Method]) -> Vec<boo
     others.iter().map(|other| view.mean(table, method) < view.mean(table, *other)).collect()
 }
 
-/// The NPI of the smallest error of a column.
+/// NPI at which the error of a column is smallest.
 fn best_npi(series: &[(f64, f64)]) -> f64 {
     let smaller = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
     series.iter().copied().min_by(smaller).map_or(f64::NAN, |(npi, _)| npi)

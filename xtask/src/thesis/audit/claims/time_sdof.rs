@@ -110,8 +110,8 @@ pub const CLAIMS: &[Claim] = &[
 
 const TABLES: [&str; 2] = ["5.2.2", "5.2.3"];
 
-/// Finds the columns of both tables in which the error rises from each NPI to the next, from NPI 6
-/// on.
+/// Tests for each column of tables 5.2.2 and 5.2.3 whether, at NPI 6 and above, the error increases
+/// from each NPI to the next.
 fn drift(view: &View) -> Result<Finding, String> {
     let rising = |table, method| {
         let tail: Vec<f64> = view

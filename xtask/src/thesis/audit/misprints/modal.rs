@@ -1,4 +1,4 @@
-//! Appendix E against the eigenvalues of its own matrices.
+//! Misprints of Appendix E, found by comparison with the eigenvalues of its own matrices.
 
 use mechid_problems::steffen_rade;
 use nalgebra::Complex;
@@ -6,10 +6,12 @@ use nalgebra::Complex;
 use super::super::markdown::number;
 use super::Remark;
 
-/// The printed identified ratio y of mode 1 (table E1) and its printed error.
+/// Printed ratios y of mode 1 in table E1: the true and the identified ratio, and the printed error
+/// of the identified one in per cent.
 const RATIO_E1: (Complex<f64>, Complex<f64>, f64) =
     (Complex::new(1.1567, 0.3474), Complex::new(1.1576, 0.3483), 0.1052);
-/// The printed ratio of mode 2 in the reproduced table, the identified one, and its printed error.
+/// Printed ratios y of mode 2 in the reproduced table of Steffen & Rade: the true and the
+/// identified ratio, and the printed error of the identified one in per cent.
 const RATIO_STEFFEN_RADE: (Complex<f64>, Complex<f64>, f64) =
     (Complex::new(-0.682, 0.275), Complex::new(-0.697, 0.291), 1.32);
 

@@ -30,7 +30,7 @@ pub fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
     ]
 }
 
-/// The cells of two tables with the same parameter, settings and method.
+/// Pairs of cells, one from each table, that have the same parameter, settings and method.
 fn pairs(published: &Published, one: &str, other: &str) -> Vec<(Cell, Cell)> {
     let same = |a: &Cell, b: &Cell| {
         a.parameter == b.parameter && a.method == b.method && a.npi == b.npi && a.nt == b.nt
