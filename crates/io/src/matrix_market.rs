@@ -371,7 +371,7 @@ mod tests {
             (format!("{banner}99999999999 99999999999 1\n1 1 1\n"), "more than 268435456 numbers"),
             (
                 "%%MatrixMarket matrix array real general\n2 2\n1 2\n".into(),
-                "a line has one number",
+                "each line has one number",
             ),
             (
                 "%%MatrixMarket matrix coordinate real skew-symmetric\n1 1 1\n1 1 1\n".into(),

@@ -355,14 +355,12 @@ fn spectral(
     let estimator = likelihood.map(PeriodEstimator::MaximumLikelihood);
     let fitted = spectra::fit(records, unknowns, lines.rule(), estimator);
     // The failed fit as open records may have shown a delay or another quantity. The failure is
-    // returned if the fit of whole periods reports neither of them.
-    let is_cause = |finding: &Finding| {
-        finding.subject() == Subject::Delay || open_records::is_of_quantity(finding)
-    };
-    let names_cause =
-        |fitted: &Fitted| fitted.after.iter().flatten().chain(&fitted.after_all).any(is_cause);
+    // returned if the fit of whole periods does not report a delay: its quantity may be wrong,
+    // because it has no transients.
+    let is_delay = |finding: &Finding| finding.subject() == Subject::Delay;
+    let names_delay = |fitted: &Fitted| fitted.after.iter().flatten().any(is_delay);
     match unfit {
-        Some(error) if !fitted.as_ref().is_ok_and(names_cause) => Err(error),
+        Some(error) if !fitted.as_ref().is_ok_and(names_delay) => Err(error),
         _ => fitted,
     }
 }

@@ -589,7 +589,7 @@ fn remarks(
         .collect()
 }
 
-pub(super) fn is_of_quantity(finding: &Finding) -> bool {
+fn is_of_quantity(finding: &Finding) -> bool {
     let cause =
         |alternative: &Alternative| matches!(alternative.cause, Cause::RecordedQuantity { .. });
     matches!(finding, Finding::Alternative(alternative) if cause(alternative))

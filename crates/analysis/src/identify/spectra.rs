@@ -88,8 +88,7 @@ pub(super) fn fit(
         noise_through,
         remark,
     } = estimated(&spectra, &data, unknowns, estimator)?;
-    // An undetermined parameter ends the fit here with an error that names it. Without this check,
-    // a later step would fail with a less useful error.
+    // An undetermined parameter ends the fit here, with an error that names the parameter.
     estimate.system()?;
     let RecordFindings { before, mut after, weighted, repeats } =
         RecordFindings::at(records, &spectra, unknowns, &estimate, noise, noise_through.as_ref())?;
