@@ -66,11 +66,13 @@ impl Fault {
         })
     }
 
-    /// Returns whether the best-fitting amount is plausible for the fault.
-    fn is_plausible(self, amount: f64) -> bool {
+    /// Returns whether the best-fitting amount is plausible for the fault. `highest` is the highest
+    /// angular frequency of the lines, in rad/s: a high-pass whose corner frequency is higher is a
+    /// derivative, not AC coupling.
+    fn is_plausible(self, amount: f64, highest: f64) -> bool {
         match self {
             Self::Between(_) => (amount - 1.0).abs() < 0.5,
-            _ => amount > 0.0,
+            _ => amount > 0.0 && amount < highest,
         }
     }
 
@@ -120,7 +122,9 @@ impl Residuals<'_> {
         let is_significant = |score: &Score| score.amount.abs() > STANDARD_ERRORS * score.error;
         let scored = faults.into_par_iter().filter_map(|fault| {
             let score = self.score(fault, 0.0, &unchanged)?;
-            let is_likely = fault.is_plausible(score.amount) && is_significant(&score);
+            // The first step may be too large.
+            let is_likely =
+                fault.is_plausible(score.amount, f64::INFINITY) && is_significant(&score);
             is_likely.then_some((fault, score))
         });
         scored.collect()
@@ -349,7 +353,7 @@ pub fn fault_of_hits(
         let widths = CORNER_WIDTHS.map(|width| width * score.amount);
         let (corner, least) =
             minimum_near(score.amount, widths, cost, |cost, _| cost < undisturbed)?;
-        fault.is_plausible(corner).then_some(())?;
+        fault.is_plausible(corner, highest(records)).then_some(())?;
         let without: Option<Vec<FrequencyData>> =
             records.iter().map(|data| fault.removed(data, &system, dt, corner)).collect();
         let remaining = least / undisturbed;
@@ -365,6 +369,11 @@ pub fn fault_of_hits(
 fn driven(records: &[FrequencyData], dof: usize) -> Vec<usize> {
     let acts = |dof: &usize| records.iter().any(|data| data.force().column(*dof).norm() > 0.0);
     (0..dof).filter(acts).collect()
+}
+
+/// Returns the highest angular frequency of the lines of all records, in rad/s.
+fn highest(records: &[FrequencyData]) -> f64 {
+    records.iter().flat_map(FrequencyData::omega).copied().fold(0.0, f64::max)
 }
 
 /// Returns the amount of a fault after some refinements, and the records without this fault.
@@ -402,6 +411,6 @@ fn removed(
         }
     }
     Ok(without_fault(amount)
-        .filter(|_| fault.is_plausible(amount))
+        .filter(|_| fault.is_plausible(amount, highest(records)))
         .map(|records| (amount, records)))
 }
