@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::changes::{self, Change, ChangeKind};
 use super::failures::FailureCount;
 use super::results::{Results, read_results};
-use crate::modes::normal_interval;
+use crate::modes::rows::normal_interval;
 use crate::text::{significant, text_table};
 use crate::{AnalysisError, ResultRow};
 

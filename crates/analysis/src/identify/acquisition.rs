@@ -208,14 +208,16 @@ impl<'a> BandLimitedFit<'a> {
     ) -> Option<Self> {
         let unknowns = fit.estimate.unknowns();
         let step = thin_step(&joined(records).ok()?, unknowns);
-        let (records, fit) = if step > 1 {
-            let thinned: Option<Vec<_>> =
-                records.iter().map(|record| record.thinned(step)).collect();
-            let thinned = thinned?;
-            let fit = output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
-            (thinned, fit)
-        } else {
-            (records.to_vec(), fit.clone())
+        // Records with errors of pulses, which are common to all lines, have no part.
+        let thinned: Option<Option<Vec<_>>> =
+            (step > 1).then(|| records.iter().map(|record| record.thinned(step)).collect());
+        let (records, fit) = match thinned.flatten() {
+            Some(thinned) => {
+                let fit =
+                    output_error_from(&joined(&thinned).ok()?, unknowns, fit, pooling).ok()?;
+                (thinned, fit)
+            }
+            None => (records.to_vec(), fit.clone()),
         };
         let level = level(&fit, &records)?;
         Some(Self { records, fit, level, unknowns, pooling })

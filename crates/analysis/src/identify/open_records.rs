@@ -316,6 +316,9 @@ impl Tested<'_> {
     /// Finds another quantity of the responses, a delay, or a fault of the acquisition that
     /// explains the residual. Also returns the outer product Δ Δᵀ of the vector Δ of the parameter
     /// changes by this cause, or `None` if a fit fails.
+    ///
+    /// # Source
+    /// Schwarz (1978), Annals of Statistics 6, 461–464, for the choice.
     fn cause(
         &self,
         dt: f64,
@@ -338,11 +341,7 @@ impl Tested<'_> {
             let new = || BandLimitedFit::new(records, fit, pooling);
             band_limited.get_or_init(new).as_ref()
         };
-        let fault = match excitation {
-            Excitation::Hits(_) => fault_of_hits(records, closed, dt, fit, residuals)
-                .map(|finding| Explanation { finding, fit: None }),
-            Excitation::Lasting => self.fault(dt, compared)?,
-        };
+        let fault = self.fault(dt, excitation, compared)?;
         let without_fault = fault
             .as_ref()
             .and_then(|Explanation { finding, fit }| self.without(finding, fit.as_ref()?, dt));
@@ -362,9 +361,13 @@ impl Tested<'_> {
             (finding, refit)
         };
         let causes = delay.into_iter().chain(fault).map(refitted);
-        let power =
-            |refit: &Option<Refit>| refit.as_ref().map_or(f64::INFINITY, |refit| refit.cost);
-        let best = causes.min_by(|(_, a), (_, b)| power(a).total_cmp(&power(b)));
+        // A delay and a corner frequency are parameters more; a force between samples has none.
+        let equations = (2 * joint.len() * joint.dof()) as f64;
+        let criterion = |(finding, refit): &(Finding, Option<Refit>)| {
+            let penalty = if between_samples(finding).is_some() { 0.0 } else { equations.ln() };
+            refit.as_ref().map_or(f64::INFINITY, |refit| refit.cost + penalty)
+        };
+        let best = causes.min_by(|a, b| criterion(a).total_cmp(&criterion(b)));
         let square = |refit: Refit| &refit.change * refit.change.transpose();
         let best = best.map(|(finding, refit)| (finding, refit.map(square)));
         // Near a resonance, a delay may have a similar effect as another quantity.
@@ -401,13 +404,20 @@ impl Tested<'_> {
     fn fault<'a>(
         &self,
         dt: f64,
+        excitation: Excitation<'_>,
         compared: impl Fn() -> Option<&'a BandLimitedFit<'a>> + Sync,
     ) -> Result<Option<Explanation>, AnalysisError> {
-        let Self { closed, fit, residuals, .. } = *self;
+        let Self { records, closed, fit, residuals } = *self;
+        let coupling = || match excitation {
+            Excitation::Hits(_) => Ok(fault_of_hits(records, closed, dt, fit, residuals)),
+            Excitation::Lasting => {
+                fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open)
+            }
+        };
         let kinds = forces_between_samples(closed, dt, &fit.estimate, residuals);
         let (between, fault) = time_limit::join(
             || if kinds.is_empty() { None } else { compared()?.between_samples(&kinds, dt) },
-            || fault_of_acquisition(closed, residuals, dt, &fit.estimate, Extent::Open),
+            coupling,
         );
         let fault = fault?;
         let compared = if kinds.is_empty() { None } else { compared() };

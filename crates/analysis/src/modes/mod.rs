@@ -14,7 +14,7 @@ mod mode_set;
 mod prediction;
 mod properties;
 pub(crate) mod resonances;
-mod rows;
+pub(crate) mod rows;
 mod saved;
 mod settings;
 mod sources;
@@ -37,7 +37,6 @@ pub(crate) use self::initial_motion::basis as free_motion_basis;
 pub use self::mode_set::ModeSet;
 pub use self::prediction::predict_with_modes;
 pub use self::properties::Properties;
-pub(crate) use self::rows::normal_interval;
 pub use self::saved::{
     SavedBackbone, SavedCandidate, SavedCheck, SavedMode, SavedModes, SavedRecord, SavedResponse,
 };

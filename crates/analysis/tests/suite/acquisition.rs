@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use mechid_analysis::identify::{Acquisition, Form, OpenFit, Source, Structure};
-use mechid_analysis::{Identified, Identify, Measurement, ResponseQuantity, identify};
+use mechid_analysis::{HitRule, Identified, Identify, Measurement, ResponseQuantity, identify};
 use mechid_checks::{Alternative, Cause, Channel, Finding, Quantity};
 use mechid_model::{Discretisation, Sdof};
 use mechid_numerics::linear_algebra::hermitian_eigen;
@@ -149,6 +149,48 @@ fn a_chain_under_a_simulated_force_is_fitted() {
 fn heavy() -> Sdof {
     let omega = TAU * 22.0;
     Sdof::new(10.0, 2.0 * 0.015 * omega * 10.0, 10.0 * omega * omega).unwrap()
+}
+
+/// Five hits of 50 ms on the oscillator [`light`], sampled at 100 Hz. The force is held or linear
+/// between its samples, and the response, from rest, has 0.3 % noise.
+fn simulated_hits(between: Discretisation, kind: ResponseQuantity, seed: u64) -> Measurement {
+    let sampling = Sampling::from_rate_hz(100.0, 5 * 1024).unwrap();
+    let force = |sample: usize| match sample % 1024 {
+        at @ 50..=53 => 80.0 * (std::f64::consts::PI * (at - 49) as f64 / 5.0).sin(),
+        _ => 0.0,
+    };
+    let force = DMatrix::from_fn(sampling.len(), 1, |sample, _| force(sample));
+    let force = Record::new(sampling, force).unwrap();
+    let response = match between {
+        Discretisation::ZeroOrderHold => light().held_force_response(&force, 0.0, 0.0),
+        _ => light().linear_force_response(&force, 0.0, 0.0),
+    };
+    let response = response.unwrap();
+    let response = match kind {
+        ResponseQuantity::Acceleration => response.acceleration(),
+        _ => response.displacement(),
+    };
+    let noisy = noise::add_white(response, NoiseLevel::FractionOfRms(0.003), seed).unwrap();
+    let level = NoiseLevel::StandardDeviation(0.01);
+    let force = noise::add_white(&force, level, seed + 1000).unwrap();
+    Measurement::from_records(&force, &[(kind, &noisy)]).unwrap()
+}
+
+/// The closed-form response to hits of a simulation. The check must name the force between the
+/// samples, as in other records, and the intervals must contain the true values.
+#[test]
+fn the_force_of_simulated_hits_is_named_and_allowed_for() {
+    let truth = [light().mass(), light().damping(), light().stiffness()];
+    (0..6_u64).into_par_iter().for_each(|seed| {
+        let between = if seed % 2 == 0 { HELD } else { Discretisation::FirstOrderHold };
+        for kind in [ResponseQuantity::Displacement, ResponseQuantity::Acceleration] {
+            let test = simulated_hits(between, kind, seed);
+            let found = identify(&[test], &Identify::hits(HitRule::default())).unwrap();
+            let expected = Some(Cause::BetweenSamples { between_samples: between });
+            assert_eq!(cause(&found), expected, "{kind}: {}", found.summary().all_checks());
+            assert_eq!(held(&found, truth), 3, "{found}");
+        }
+    });
 }
 
 /// Steady state after a first-order high-pass filter with the corner `hz`, exact on the lines of
