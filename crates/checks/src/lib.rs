@@ -146,7 +146,7 @@ pub use unequal_periods::UnequalPeriods;
 pub use unit::{TimeUnit, Unit};
 pub use unmeasured_force::UnmeasuredForce;
 pub use unrelated::{Unrelated, unrelated_response};
-pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
+pub use weighted_fit::{AfterSpectralFit, after_spectral_fit, log_residual_power};
 pub use whiteness::{NoiseSpan, Residual, Whiteness};
 pub use work_limit::WorkLimit;
 

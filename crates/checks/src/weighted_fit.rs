@@ -211,10 +211,19 @@ impl<'a> Weighing<'a> {
         }
     }
 
-    /// Returns the weighted residual of the estimate for modified data of a record.
+    /// Returns the weighted residual of the estimate for modified data of a record. The weights
+    /// include the modified noise of the forces.
     pub(super) fn residual_of(&self, at: usize, data: &FrequencyData) -> Option<DVector<f64>> {
         let (entries, unknowns) = (DVector::from_vec(self.entries()), self.estimate.unknowns());
-        let covariance = |row: usize| self.covariance(at, row);
+        let covariance = |row: usize| {
+            let mut covariance = self.covariance(at, row);
+            let before = self.records[at].force_variance().row(row);
+            for (channel, before) in before.iter().enumerate().filter(|(_, v)| **v > 0.0) {
+                let changed = data.force_variance()[(row, channel)] / before;
+                covariance[(data.dof() + channel, data.dof() + channel)] *= changed;
+            }
+            covariance
+        };
         Some(Whitened::residual_of(data, unknowns, &entries, covariance)?.residual)
     }
 
@@ -397,6 +406,23 @@ fn likely_force(
 fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
     let pairs_by_channel = residuals(records, estimate)?;
     Some(pairs_by_channel.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+}
+
+/// Returns the mean over the channels of the logarithm of their residual power, or, if the forces
+/// have noise, of the equivalent of it: twice the negative logarithm of the likelihood per line, with
+/// white noise of the most likely level on each channel, minus one. `None` if a response does not
+/// exist.
+pub fn log_residual_power(records: &[FrequencyData], estimate: &Estimate) -> Option<f64> {
+    let channels = residuals(records, estimate)?;
+    let of_channel = |pairs: &Vec<(f64, f64)>| {
+        let level = motion_level(pairs.iter().copied()).powi(2);
+        let of_line = |(power, by_force): &(f64, f64)| {
+            let variance = (level + by_force).max(f64::MIN_POSITIVE);
+            variance.ln() + power / variance - 1.0
+        };
+        pairs.iter().map(of_line).sum::<f64>() / pairs.len() as f64
+    };
+    Some(channels.iter().map(of_channel).sum::<f64>() / channels.len() as f64)
 }
 
 /// Returns, for each channel and for each line of all records, the residual power in the measured

@@ -3,16 +3,17 @@
 use std::f64::consts::TAU;
 use std::str::FromStr;
 
-use mechid_checks::{Alternative, Cause, Finding, after_spectral_fit, is_noise};
+use mechid_checks::{
+    Alternative, Cause, Finding, after_spectral_fit, is_noise, log_residual_power,
+};
 use mechid_estimate::frequency_domain::{
     ChangedRecords, OutputErrorFit, equivalent_force, output_error_from, output_error_pooling,
     thin_step,
 };
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::{Discretisation, SecondOrderSystem};
+use mechid_model::Discretisation;
 use mechid_signal::Extent;
 use mechid_spectra::{FrequencyData, Pooling};
-use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::open_records::joined;
@@ -321,27 +322,9 @@ fn closed(fit: &OutputErrorFit, records: &[FrequencyData]) -> Option<Vec<Frequen
     fit.ends.as_ref()?.without_transients(records).ok()
 }
 
-/// Returns the mean over the channels of the logarithms of their residual powers.
+/// Returns the mean over the channels of the logarithms of the residual powers of a fit.
 fn level(fit: &OutputErrorFit, records: &[FrequencyData]) -> Option<f64> {
-    let system = fit.estimate.system().ok()?;
-    let powers = closed(fit, records)?.into_iter();
-    let sum = powers
-        .map(|record| residual_powers(&record, &system))
-        .reduce(|sum, powers| sum + powers)?;
-    Some(sum.map(f64::ln).mean())
-}
-
-/// Returns the power of the residual of each channel, in the squared unit of the measured quantity.
-fn residual_powers(record: &FrequencyData, system: &SecondOrderSystem) -> DVector<f64> {
-    let mut powers = DVector::zeros(record.dof());
-    for (row, &omega) in record.omega().iter().enumerate() {
-        let measured = record.displacement().row(row).transpose();
-        let force = record.force().row(row).transpose();
-        let Some(modelled) = system.dynamic_stiffness(omega).lu().solve(&force) else { continue };
-        let scale = record.measured().per_displacement(omega).norm_sqr();
-        powers += (measured - modelled).map(|error| scale * error.norm_sqr());
-    }
-    powers
+    log_residual_power(&closed(fit, records)?, &fit.estimate)
 }
 
 /// Returns the largest change of a parameter between two estimates, in standard errors.

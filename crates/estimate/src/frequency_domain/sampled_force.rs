@@ -2,7 +2,7 @@
 
 use mechid_model::{Discretisation, ResponseQuantity, SecondOrderSystem, StateTransition};
 use mechid_spectra::FrequencyData;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix};
 
 /// Sampled response of a system to a force that is held or linear between its samples.
 struct SampledResponse<'a> {
@@ -27,13 +27,14 @@ impl<'a> SampledResponse<'a> {
         Some(Self { system, step, inverse_mass, dt, dof: system.dof() })
     }
 
-    /// Returns the sampled response, in the given quantity, to a force (N) at ω (rad/s).
+    /// Returns the sampled responses, in the given quantity, to forces (N) at ω (rad/s); each column
+    /// is one case of load.
     fn at(
         &self,
         omega: f64,
-        force: &DVector<Complex<f64>>,
+        force: &DMatrix<Complex<f64>>,
         quantity: ResponseQuantity,
-    ) -> Option<DVector<Complex<f64>>> {
+    ) -> Option<DMatrix<Complex<f64>>> {
         let turn = Complex::cis(omega * self.dt);
         let complex = |matrix: &DMatrix<f64>| matrix.map(|entry| Complex::new(entry, 0.0));
         let input = complex(&self.step.held) + complex(&self.step.ramp) * (turn - 1.0);
@@ -55,9 +56,10 @@ impl<'a> SampledResponse<'a> {
     }
 }
 
-/// Returns the data with an equivalent band-limited force (N). The force of the data is held or
-/// linear between its samples, which are `dt` (s) apart; at the samples `system` responds to both
-/// forces in the same way. `None` for Euler's rule, and if a response does not exist.
+/// Returns the data with an equivalent band-limited force (N), and with the variance of its noise.
+/// The force of the data is held or linear between its samples, which are `dt` (s) apart; at the
+/// samples `system` responds to both forces in the same way. `None` for Euler's rule, and if a
+/// response does not exist.
 ///
 /// # Source
 /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (sampling of a
@@ -69,14 +71,23 @@ pub fn equivalent_force(
     between: Discretisation,
 ) -> Option<FrequencyData> {
     let sampled = SampledResponse::new(system, dt, between)?;
-    let mut equivalent = data.force().clone();
+    let (mut equivalent, mut variance) = (data.force().clone(), data.force_variance().clone());
     for (row, &omega) in data.omega().iter().enumerate() {
-        let force = data.force().row(row).transpose();
-        let response = sampled.at(omega, &force, data.measured())?;
-        let displacement = response / data.measured().per_displacement(omega);
-        let force = system.dynamic_stiffness(omega) * displacement;
-        equivalent.row_mut(row).copy_from(&force.transpose());
+        let noisy: Vec<usize> =
+            (0..data.dof()).filter(|dof| data.force_variance()[(row, *dof)] > 0.0).collect();
+        let mut loads = DMatrix::zeros(data.dof(), 1 + noisy.len());
+        loads.set_column(0, &data.force().row(row).transpose());
+        for (column, &dof) in noisy.iter().enumerate() {
+            loads[(dof, 1 + column)] = Complex::from(1.0);
+        }
+        let responses = sampled.at(omega, &loads, data.measured())?;
+        let displacements = responses / data.measured().per_displacement(omega);
+        let forces = system.dynamic_stiffness(omega) * displacements;
+        equivalent.row_mut(row).tr_copy_from(&forces.column(0));
+        for (column, &dof) in noisy.iter().enumerate() {
+            variance[(row, dof)] *= forces[(dof, 1 + column)].norm_sqr();
+        }
     }
     let is_finite = equivalent.iter().all(|force| force.is_finite());
-    is_finite.then(|| data.with_force(equivalent))
+    is_finite.then(|| data.with_noisy_force(equivalent, variance))
 }

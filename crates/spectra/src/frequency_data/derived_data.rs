@@ -51,10 +51,10 @@ impl FrequencyData {
         Self { force_variance: &self.force_variance * factor, ..self.clone() }
     }
 
-    /// Returns the same data with other forces (N), rows × n.
+    /// Returns the same data with other forces (N) and other variances of their noise (N²), rows × n.
     #[must_use]
-    pub fn with_force(&self, force: DMatrix<Complex<f64>>) -> Self {
-        Self { force, ..self.clone() }
+    pub fn with_noisy_force(&self, force: DMatrix<Complex<f64>>, variance: DMatrix<f64>) -> Self {
+        Self { force, force_variance: variance, ..self.clone() }
     }
 
     /// Returns the same data without the errors of the pulses of the forces (N), which are the
@@ -103,6 +103,7 @@ impl FrequencyData {
                 }
                 if !forces.contains(&channel) {
                     data.force[(row, channel)] *= gain;
+                    data.force_variance[(row, channel)] *= gain.norm_sqr();
                 }
             }
         }
