@@ -43,18 +43,18 @@ pub(crate) const NOISE_GAP: f64 = 3.0;
 // Noise above the driven band
 
 /// Number of lines over which the power is averaged for one level of the noise floor.
-pub(crate) const FLOOR_LINES: usize = 64;
+pub(crate) const FLOOR_LINES: usize = 16;
 
 /// Minimum number of equal levels of a noise floor, counted downwards from half the sampling rate.
 pub(crate) const FLOOR_LEVELS: usize = 3;
 
-/// Largest ratio of two levels that count as equal. Its logarithm is more than four standard
+/// Largest ratio of two levels that count as equal. Its logarithm is four standard
 /// deviations of the logarithm of such a ratio in noise.
-pub(crate) const FLOOR_RATIO: f64 = 3.0;
+pub(crate) const FLOOR_RATIO: f64 = 7.0;
 
-/// Standard deviation of the logarithm of a level averaged over 64 lines; under Hann's window,
+/// Standard deviation of the logarithm of a level averaged over 16 lines; under Hann's window,
 /// neighbouring lines are correlated.
-pub(crate) const FLOOR_SCATTER: f64 = 0.17;
+pub(crate) const FLOOR_SCATTER: f64 = 0.34;
 
 /// Maximum difference between the mean levels of the upper and the lower half of a noise floor, in
 /// standard deviations; above it the floor is not flat, and the signal is not only noise.
