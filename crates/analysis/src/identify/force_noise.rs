@@ -42,8 +42,8 @@ pub enum ForceNoiseSource {
     AboveBand,
     /// Samples between the hits of a hammer.
     BetweenHits,
-    /// Residual of the fit, which shows that the noise in the band is less than the level on the
-    /// lines above the driven band.
+    /// Residual of the fit: the lines above the driven band show no level, or a higher one than the
+    /// residual.
     Residual,
 }
 
@@ -86,6 +86,19 @@ impl ForceNoise {
             (levels_n, ForceNoiseSource::AboveBand)
         };
         Ok(Self { levels_n, source, rms, pulses })
+    }
+
+    /// Returns whether the level of every acting force is unknown.
+    pub(super) fn is_unknown(&self) -> bool {
+        let mut acting = self.levels_n.iter().zip(&self.rms).filter(|(_, rms)| rms.is_some());
+        self.pulses.is_none() && acting.all(|(level, _)| level.is_none())
+    }
+
+    /// Returns the same noise with levels of this fraction of the RMS of each force, which follows
+    /// from the residual of a fit.
+    pub(super) fn with_fraction(&self, fraction: f64) -> Self {
+        let levels = self.rms.iter().map(|rms| Some(fraction * rms.unwrap_or(0.0)));
+        Self { levels_n: levels.collect(), source: ForceNoiseSource::Residual, ..self.clone() }
     }
 
     /// Multiplies the levels by a factor that follows from the residual of a fit.
@@ -141,15 +154,13 @@ impl ForceNoise {
         let Some(levels) =
             levels_and_rms.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>()
         else {
-            return "the noise of the force is not known, because the force spectrum has no flat floor above the excited band (it covers all lines or falls slowly, or the record is too short): the noise is assumed zero, and any noise of the force biases the estimate; state this noise (`force_noise`)"
+            return "the noise of the force is not known: the force spectrum has no flat floor above the excited band (it covers all lines or falls slowly, or the record is too short). The noise is assumed zero; if it is not, it biases the estimate: state it (`force_noise`)"
                 .into();
         };
         let of = match source {
             Some(ForceNoiseSource::Stated) => "as stated",
             Some(ForceNoiseSource::BetweenHits) => "estimated between the hits",
-            Some(ForceNoiseSource::Residual) => {
-                "estimated from the residual, which shows less noise than the lines above the excited band"
-            }
+            Some(ForceNoiseSource::Residual) => "estimated from the residual of the fit",
             Some(ForceNoiseSource::AboveBand) | None => "estimated above the excited band",
         };
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);

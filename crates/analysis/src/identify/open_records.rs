@@ -12,7 +12,8 @@ use mechid_checks::{
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, OutputErrorFit, PartsOfFit, Refit, SampledRows, Split, equivalent_force,
-    force_noise_factor, output_error_from, output_error_pooling, with_noise_of,
+    force_noise_factor, force_noise_of_residual, output_error_from, output_error_pooling,
+    with_noise_of,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
@@ -48,8 +49,10 @@ const LEVEL: f64 = 1e-3;
 /// transient.
 const ROUNDING: f64 = 1e-20;
 
-/// Maximum number of reductions of the noise of the forces.
+/// Maximum number of changes of the noise of the forces.
 const FORCE_NOISE_ROUNDS: usize = 8;
+/// Relative change of the variance of the noise of the forces that ends the changes.
+const FORCE_NOISE_SETTLED: f64 = 0.05;
 
 /// Maximum number of lines for which a record without settings is tried as an open record. As an
 /// example of the time: a fit with two forces takes ten seconds on one processor if its product of
@@ -134,6 +137,54 @@ impl OpenSpectra {
         Ok(Self { data, lines, force_noise: of_force })
     }
 
+    /// Estimates the noise level of the forces from the residual if no record shows it above the
+    /// driven band: one fraction of the RMS for all forces. Returns the last fit, which is the given
+    /// one if the residual shows no noise of the forces or the search fails.
+    fn with_unknown_force_noise(
+        &mut self,
+        records: &[Windowed],
+        mut fit: OutputErrorFit,
+        unknowns: &Unknowns,
+        noise: &OpenNoise,
+    ) -> Result<OutputErrorFit, AnalysisError> {
+        if !self.force_noise.iter().all(ForceNoise::is_unknown) {
+            return Ok(fit);
+        }
+        let whole = joined(&self.with_force_noise(records, 1.0)?.0)?;
+        let mut last = 0.0;
+        for _ in 0..FORCE_NOISE_ROUNDS {
+            let joint = whole.without_sinusoids(&fit.sinusoids);
+            let Some(ratio) = force_noise_of_residual(&joint, unknowns, &fit) else { break };
+            let (data, force_noise) = self.with_force_noise(records, ratio.sqrt())?;
+            let Ok(next) = output_error_from(&joined(&data)?, unknowns, &fit, noise.response)
+            else {
+                break;
+            };
+            if time_limit::is_over() {
+                break;
+            }
+            (fit, self.data, self.force_noise) = (next, data, force_noise);
+            if (ratio - last).abs() <= FORCE_NOISE_SETTLED * ratio {
+                break;
+            }
+            last = ratio;
+        }
+        Ok(fit)
+    }
+
+    /// Returns the data with noise of the forces of this fraction of the RMS of each, and this noise.
+    fn with_force_noise(
+        &self,
+        records: &[Windowed],
+        fraction: f64,
+    ) -> Result<(Vec<FrequencyData>, Vec<ForceNoise>), AnalysisError> {
+        let noisy = |((record, data), noise): ((&Windowed, &FrequencyData), &ForceNoise)| {
+            let noise = noise.with_fraction(fraction);
+            Ok((noise.known_to(data.clone(), &record.held)?, noise))
+        };
+        records.iter().zip(&self.data).zip(&self.force_noise).map(noisy).collect()
+    }
+
     /// Reduces the noise level of the forces if it was estimated above the driven band in every
     /// record. This estimate is too high if, for example, a force has a signal above the band. The
     /// reductions end when the residual of the fit no longer shows a lower noise level. The machine
@@ -195,6 +246,7 @@ pub(super) fn fit(
     let fit = output_error_pooling(&joint, unknowns, noise.response)
         .map_err(|error| with_cause(error, &spectra.data, dt, unknowns, noise.response))?;
     let fit = spectra.with_likely_force_noise(fit, unknowns, noise)?;
+    let fit = spectra.with_unknown_force_noise(records, fit, unknowns, noise)?;
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
     spectra.without_sinusoids(&fit);

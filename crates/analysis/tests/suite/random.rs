@@ -252,6 +252,42 @@ fn a_signal_above_the_band_is_no_noise() {
     assert!(reduced <= 1 && held >= 53 && warned <= 2, "{reduced} {held} {warned}");
 }
 
+/// Reference: the generator. The force has lines up to half the sampling rate, so no line shows its
+/// noise of 2 % alone. The residual must show this noise, the intervals must contain the true
+/// values, and nothing must be warned of. Without noise, the force must count as exact.
+#[test]
+fn noise_of_a_force_up_to_half_the_sampling_rate_is_found() {
+    const RUNS: u64 = 20;
+    let rig = rig();
+    let told = |seed: u64, fraction: f64| {
+        let sampling = Sampling::new(0.002, 4 * SAMPLES).unwrap();
+        let force = noise::white(sampling, 1, 100.0, seed).unwrap();
+        let steady = exact_harmonic_periodic(&rig.system, &force).unwrap();
+        let noisy = |record: &Record, fraction: f64, seed: u64| {
+            let level = NoiseLevel::FractionOfRms(fraction);
+            let noisy = noise::add_white(record, level, seed).unwrap();
+            noisy.window(SAMPLES / 2, SAMPLES).unwrap()
+        };
+        let response = noisy(steady.displacement(), 0.01, seed + 500_000);
+        let force = noisy(&force, fraction, seed + 600_000);
+        let test = Measurement::from_records(&force, &[(KIND, &response)]).unwrap();
+        let found = identify(&[test], &Identify::default()).unwrap();
+        let held = ["m", "c", "k"].iter().filter(|name| holds(&found, name)).count();
+        let source = found.summary().fit.force_noise[0].source;
+        (source == ForceNoiseSource::Residual, held, warns(&found))
+    };
+    let count = |fraction: f64| {
+        let all: Vec<_> = (0..RUNS).into_par_iter().map(|seed| told(seed, fraction)).collect();
+        let found = all.iter().filter(|(is_found, ..)| *is_found).count();
+        let held: usize = all.iter().map(|(_, held, _)| held).sum();
+        (found, held, all.iter().filter(|(.., warns)| *warns).count())
+    };
+    let (found, held, warned) = count(0.02);
+    assert!(found >= 19 && held >= 53 && warned <= 1, "{found} {held} {warned}");
+    let (found, held, warned) = count(0.0);
+    assert!(found <= 2 && held >= 53 && warned <= 1, "{found} {held} {warned}");
+}
+
 #[test]
 fn a_period_stays_one() {
     let open = |seed: u64| {

@@ -72,7 +72,7 @@ mod whitened;
 pub use changed_records::ChangedRecords;
 pub use delayed_force::DelayedForce;
 pub use equation_error::{equation_error, equation_rows};
-pub use force_noise::force_noise_factor;
+pub use force_noise::{force_noise_factor, force_noise_of_residual};
 pub use instrumental::instrumental_variables;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use multi_start::thin_step;

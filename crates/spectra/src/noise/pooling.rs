@@ -124,6 +124,22 @@ pub enum NoiseModel {
     PerLine,
 }
 
+impl NoiseModel {
+    /// Returns the number of parameters of the spectrum of one channel on this number of `lines`:
+    /// coefficients, the level and both ends of every band, or independent means.
+    pub fn parameters(&self, lines: usize) -> f64 {
+        match self {
+            Self::White => 1.0,
+            Self::Smooth { order, bands_hz } | Self::UnmeasuredForce { order, bands_hz } => {
+                (1 + order + 3 * bands_hz.len()) as f64
+            }
+            Self::Proportional { with_white } => 1.0 + f64::from(*with_white),
+            Self::Neighbours { half_width } => lines as f64 / (2 * half_width + 1) as f64,
+            Self::PerLine => lines as f64,
+        }
+    }
+}
+
 impl fmt::Display for NoiseModel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
