@@ -408,10 +408,13 @@ fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
     Some(pairs_by_channel.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
 }
 
-/// Returns the mean over the channels of the logarithm of their residual power, or, if the forces
-/// have noise, of the equivalent of it: twice the negative logarithm of the likelihood per line, with
-/// white noise of the most likely level on each channel, minus one. `None` if a response does not
-/// exist.
+/// Returns the mean over the channels of the logarithm of their residual power per line, in the
+/// squared unit of the measured quantity. If the forces have noise, it returns the equivalent:
+/// minus the logarithm of the likelihood per line, with white noise of the most likely level on
+/// each channel, minus one. `None` if a response does not exist.
+///
+/// # Source
+/// Likelihood of circular Gaussian residuals.
 pub fn log_residual_power(records: &[FrequencyData], estimate: &Estimate) -> Option<f64> {
     let channels = residuals(records, estimate)?;
     let of_channel = |pairs: &Vec<(f64, f64)>| {

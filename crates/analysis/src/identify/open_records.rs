@@ -137,9 +137,9 @@ impl OpenSpectra {
         Ok(Self { data, lines, force_noise: of_force })
     }
 
-    /// Estimates the noise level of the forces from the residual if no record shows it above the
-    /// driven band: one fraction of the RMS for all forces. Returns the last fit, which is the given
-    /// one if the residual shows no noise of the forces or the search fails.
+    /// Estimates the noise level of the forces from the residual: one fraction of the RMS for all
+    /// forces. Returns the last fit; it is the given fit if the residual shows no noise of the
+    /// forces or the search fails.
     fn with_unknown_force_noise(
         &mut self,
         records: &[Windowed],
@@ -147,9 +147,6 @@ impl OpenSpectra {
         unknowns: &Unknowns,
         noise: &OpenNoise,
     ) -> Result<OutputErrorFit, AnalysisError> {
-        if !self.force_noise.iter().all(ForceNoise::is_unknown) {
-            return Ok(fit);
-        }
         let whole = joined(&self.with_force_noise(records, 1.0)?.0)?;
         let mut last = 0.0;
         for _ in 0..FORCE_NOISE_ROUNDS {
@@ -172,7 +169,8 @@ impl OpenSpectra {
         Ok(fit)
     }
 
-    /// Returns the data with noise of the forces of this fraction of the RMS of each, and this noise.
+    /// Returns the data with noise of the forces, whose level is this fraction of the RMS of each
+    /// force, and this noise.
     fn with_force_noise(
         &self,
         records: &[Windowed],
@@ -188,13 +186,18 @@ impl OpenSpectra {
     /// Reduces the noise level of the forces if it was estimated above the driven band in every
     /// record. This estimate is too high if, for example, a force has a signal above the band. The
     /// reductions end when the residual of the fit no longer shows a lower noise level. The machine
-    /// is fitted again after each reduction. Returns the last fit.
+    /// is fitted again after each reduction. If no record shows a level above the driven band, the
+    /// residual gives the level. Returns the last fit.
     fn with_likely_force_noise(
         &mut self,
+        records: &[Windowed],
         mut fit: OutputErrorFit,
         unknowns: &Unknowns,
         noise: &OpenNoise,
     ) -> Result<OutputErrorFit, AnalysisError> {
+        if self.force_noise.iter().all(ForceNoise::is_unknown) {
+            return self.with_unknown_force_noise(records, fit, unknowns, noise);
+        }
         let is_above_band = |noise: &ForceNoise| noise.source == ForceNoiseSource::AboveBand;
         if !self.force_noise.iter().all(is_above_band) {
             return Ok(fit);
@@ -245,8 +248,7 @@ pub(super) fn fit(
     let joint = joined(&spectra.data)?;
     let fit = output_error_pooling(&joint, unknowns, noise.response)
         .map_err(|error| with_cause(error, &spectra.data, dt, unknowns, noise.response))?;
-    let fit = spectra.with_likely_force_noise(fit, unknowns, noise)?;
-    let fit = spectra.with_unknown_force_noise(records, fit, unknowns, noise)?;
+    let fit = spectra.with_likely_force_noise(records, fit, unknowns, noise)?;
     let (fit, data) = acquisition.refitted(fit, &spectra.data, dt, unknowns, noise.response)?;
     spectra.data = data;
     spectra.without_sinusoids(&fit);

@@ -27,8 +27,8 @@ impl<'a> SampledResponse<'a> {
         Some(Self { system, step, inverse_mass, dt, dof: system.dof() })
     }
 
-    /// Returns the sampled responses, in the given quantity, to forces (N) at ω (rad/s); each column
-    /// is one case of load.
+    /// Returns the sampled responses, in the given quantity, to forces (N) at ω (rad/s). Each
+    /// column of both is one case.
     fn at(
         &self,
         omega: f64,

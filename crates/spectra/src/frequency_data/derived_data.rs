@@ -51,7 +51,8 @@ impl FrequencyData {
         Self { force_variance: &self.force_variance * factor, ..self.clone() }
     }
 
-    /// Returns the same data with other forces (N) and other variances of their noise (N²), rows × n.
+    /// Returns the same data with other forces (N) and other variances of their noise (N²), both
+    /// rows × n.
     #[must_use]
     pub fn with_noisy_force(&self, force: DMatrix<Complex<f64>>, variance: DMatrix<f64>) -> Self {
         Self { force, force_variance: variance, ..self.clone() }

@@ -125,8 +125,12 @@ pub enum NoiseModel {
 }
 
 impl NoiseModel {
-    /// Returns the number of parameters of the spectrum of one channel on this number of `lines`:
-    /// coefficients, the level and both ends of every band, or independent means.
+    /// Returns the number of parameters (a pure number) of the spectrum of one channel on this
+    /// number of `lines`: coefficients, the level and both ends of every band, or independent
+    /// means.
+    ///
+    /// # Source
+    /// Ours.
     pub fn parameters(&self, lines: usize) -> f64 {
         match self {
             Self::White => 1.0,
