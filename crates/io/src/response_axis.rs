@@ -134,8 +134,9 @@ pub(crate) fn sort(responses: &mut FrequencyResponses) -> Result<(), IoError> {
     }
     if negative + mirrored > 0 {
         let count = negative + mirrored;
+        let frequencies = if count == 1 { "frequency" } else { "frequencies" };
         responses.remarks.push(format!(
-            "left out: {count} mirrored frequencies, negative or above half the sampling rate"
+            "left out: {count} mirrored {frequencies}, negative or above half the sampling rate"
         ));
     }
     let pick = |values: &[f64]| order.iter().map(|at| values[*at]).collect::<Vec<f64>>();

@@ -12,7 +12,7 @@ use mechid_spectra::LineData;
 use super::checks;
 use super::diagrams::DiagramData;
 use super::halves::Halves;
-use super::rows::rows_of;
+use super::rows::{rows_of, small_gain};
 use super::settings::ModesSettings;
 use super::sources::{Output, all_responses, outputs_of};
 use super::summary::{
@@ -180,11 +180,7 @@ fn uncertain(value: &ModalValue) -> Uncertain {
 
 fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     let reason = match candidate.reason {
-        DropReason::SmallGain { gain, needed } => format!(
-            "it improves the fit by {} (2 log L), but {} is needed",
-            significant(gain, 3),
-            significant(needed, 3)
-        ),
+        DropReason::SmallGain { gain, needed } => small_gain(gain, needed),
         DropReason::DampingUndetermined { ratio } => format!(
             "its damping ratio is only {} times its standard error: it may be a harmonic or a chance peak",
             significant(ratio, 2)

@@ -134,13 +134,21 @@ fn vector(shape: &[Complex<f64>]) -> DVector<Complex<f64>> {
     DVector::from_column_slice(shape)
 }
 
+/// Returns the reason to drop a candidate that improves the fit by `gain` in −2 log L, if
+/// `required` is necessary.
+pub(super) fn small_gain(gain: f64, required: f64) -> String {
+    let required = significant(required, 3);
+    if gain > 0.0 {
+        let gain = significant(gain, 3);
+        format!("it improves the fit by {gain} (−2 log L), but {required} is needed")
+    } else {
+        format!("no fit with it is better; an improvement by {required} (−2 log L) is needed")
+    }
+}
+
 pub(super) fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
     let reason = match candidate.reason {
-        DropReason::Insignificant { gain, required } => format!(
-            "it improves the fit by {} (−2 log L), but {} is needed",
-            significant(gain, 3),
-            significant(required, 3)
-        ),
+        DropReason::Insignificant { gain, required } => small_gain(gain, required),
         DropReason::UndeterminedDamping { standard_error } => format!(
             "its damping ratio is not significantly above zero (standard error {} %), like that of a sinusoid: the \
              candidate stays in the model",

@@ -29,7 +29,7 @@ use crate::system::System;
 /// use mechid_model::{SparseSystem, band};
 /// use mechid_signal::Sampling;
 ///
-/// // Each mass gains energy at the rate 0.1 1/s, over a period of 2 s.
+/// // The amplitude of each mass grows at the rate 0.1 1/s, over a period of 2 s.
 /// let n = 400;
 /// let (mass, damping) = (band(n, &[(0, 1.0)]), band(n, &[(0, -0.2)]));
 /// let chain = SparseSystem::new(mass, damping, band(n, &[(-1, -90.0), (0, 190.0), (1, -90.0)]))?;

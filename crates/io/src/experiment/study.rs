@@ -105,7 +105,8 @@ impl ExperimentStudy {
                         "without noise all runs are the same: describe `noise` and a seed".into(),
                     )
                 })?;
-                if noise.seed.saturating_add(*count as u64) > LARGEST_WHOLE {
+                let further = (*count as u64).saturating_sub(1);
+                if noise.seed.saturating_add(further) > LARGEST_WHOLE {
                     return Err(refused(format!(
                         "{count} seeds, counted up from {}, exceed the largest possible seed, \
                          {LARGEST_WHOLE}: choose a smaller first seed",

@@ -182,7 +182,9 @@ impl Parser {
             _ => return Err("|x| is not one of the supported laws".to_owned()),
         };
         *total = total.saturating_add(exponent);
-        self.take('*');
+        if self.take('*') && matches!(self.peek(), None | Some('/')) {
+            return Err(format!("expected x or v after *, found {}", shown(self.peek())));
+        }
         Ok(())
     }
 
@@ -322,6 +324,7 @@ mod tests {
             ("k3: (x1-x1)^2", "two different degrees of freedom"),
             ("k3: x1^99", "at most 9"),
             ("k3: x1^", "expected a whole number, found the end"),
+            ("k3: x1^2 * x1 *", "expected x or v after *, found the end"),
             ("c: |x| x", "|x| is not one of the supported laws"),
             ("c: |v|", "allowed only in |v| v"),
             ("c: v^2/(1+(v/2)^2)", "only v^3 can be divided"),
